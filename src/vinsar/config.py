@@ -1,0 +1,251 @@
+"""The configuration: every key, its unit, its bounds and its place in the paper.
+
+The models hold no defaults: ``config/paper.yaml`` has every value, other studies override it.
+Checks that need radar physics are in `vinsar.validation`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def _key(description: str, paper: str, **bounds: Any) -> Any:
+    """Describe one key: what it means, where the paper gives it, and its bounds."""
+    return Field(description=description, json_schema_extra={"paper": paper}, **bounds)
+
+
+class Section(BaseModel):
+    """A part of the configuration that never changes and knows all its keys."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True, validate_default=True
+    )
+
+
+class Radar(Section):
+    """The radar and its antennas (Table 1)."""
+
+    system: Literal["rail"] = _key("antenna arrangement: one cart on a roof rail", "section 1")
+    start_frequency_hz: float = _key("lowest frequency", "Table 1", gt=0)
+    stop_frequency_hz: float = _key("highest frequency", "Table 1", gt=0)
+    frequency_count: int = _key("number of frequencies, evenly spaced", "not given", ge=2)
+    aperture_length_m: float = _key("length of the synthetic aperture along x", "Table 1", gt=0)
+    position_spacing_m: float = _key("spacing of the antenna positions", "Table 1", gt=0)
+    rail_height_m: float = _key("height of the lower antenna above ground, H0", "not given", gt=0)
+    baseline_m: float = _key("distance between the antennas, B", "Table 1", gt=0)
+    baseline_angle_deg: float = _key(
+        "attitude of the baseline from horizontal, beta; 90 is vertical", "Table 1", ge=0, le=180
+    )
+
+
+class Scene(Section):
+    """The true terrain: for the simulated echo and the metrics, never for the processing."""
+
+    terrain: Literal["peaks", "flat"] = _key("shape of the terrain", "section 2")
+    peak_height_m: float = _key("height of the highest top of `peaks`", "section 2", gt=0)
+    x_min_m: float = _key("left edge", "section 2")
+    x_max_m: float = _key("right edge", "section 2")
+    y_min_m: float = _key("near edge", "section 2")
+    y_max_m: float = _key("far edge", "section 2")
+    terrain_spacing_m: float = _key(
+        "spacing of the raster that represents the terrain", "not given", gt=0
+    )
+    facet_size_m: float = _key("side of a facet", "section 2.1, without a figure", gt=0)
+    facet_jitter: float = _key(
+        "random displacement of the facets, as a fraction of the facet size (full width)",
+        "section 2.1, without a figure",
+        ge=0,
+        le=1,
+    )
+    reflectivity_offset: float = _key(
+        "reflectivity is the height in metres plus this", "section 2", gt=0
+    )
+
+
+class Echo(Section):
+    """How the echo is simulated."""
+
+    reflectivity: Literal["amplitude", "power"] = _key(
+        "what the scene's reflectivity weights: the echo's amplitude or its power", "not given"
+    )
+    occlusion: bool = _key("terrain hides what lies behind it (Eqs. 8-9)", "section 2.1")
+    spreading: bool = _key(
+        "amplitude falls with 1 / (transmit range x receive range), relative to the scene centre",
+        "not mentioned",
+    )
+    snr_db: float | None = _key(
+        "signal-to-noise ratio in a range-compressed resolution cell; null for no noise",
+        "not mentioned",
+        ge=-40,
+        le=120,
+    )
+    accuracy_db: float = _key(
+        "largest error of the fast sum against the direct one", "not given", ge=-200, le=-40
+    )
+
+
+class Imaging(Section):
+    """Range compression and back-projection."""
+
+    x_min_m: float = _key("left edge of the image", "section 2")
+    x_max_m: float = _key("right edge of the image", "section 2")
+    y_min_m: float = _key("near edge of the image", "section 2")
+    y_max_m: float = _key("far edge of the image", "section 2")
+    grid_spacing_m: float = _key("pixel spacing of image and DEM", "not given", gt=0)
+    range_window: Literal["rectangular", "hann", "hamming", "blackman"] = _key(
+        "weighting of the frequencies", "not mentioned"
+    )
+    aperture_window: Literal["rectangular", "hann", "hamming", "blackman"] = _key(
+        "weighting of the antenna positions", "not mentioned"
+    )
+    oversampling: int = _key(
+        "range samples per resolution cell before linear interpolation", "not given", ge=2, le=128
+    )
+
+
+class Interferogram(Section):
+    """Interferogram and coherence."""
+
+    coherence_window_px: int = _key(
+        "side of the multilook window of the coherence, odd", "not mentioned", ge=1
+    )
+
+
+class Filtering(Section):
+    """The filter of the interferometric phase."""
+
+    method: Literal["goldstein", "boxcar", "none"] = _key("the filter", "section 2.2")
+    goldstein_alpha: float = _key(
+        "strength: exponent of the smoothed spectrum", "reference 19", ge=0, le=1
+    )
+    goldstein_patch_px: int = _key("side of a patch", "reference 19", ge=4)
+    goldstein_step_px: int = _key("step between patches", "reference 19", ge=1)
+    boxcar_window_px: int = _key("side of the boxcar, odd", "not mentioned", ge=1)
+
+
+class Unwrapping(Section):
+    """Phase unwrapping."""
+
+    method: Literal["whirlwind", "skimage", "kamui", "snaphu"] = _key(
+        "the unwrapper; snaphu has to be installed by you", "section 2.3, reference 15"
+    )
+
+
+class Rectangle(Section):
+    """A rectangle on the ground."""
+
+    x_min_m: float = _key("left edge", "not given")
+    x_max_m: float = _key("right edge", "not given")
+    y_min_m: float = _key("near edge", "not given")
+    y_max_m: float = _key("far edge", "not given")
+
+
+class ControlPoint(Section):
+    """A surveyed point."""
+
+    x_m: float = _key("position along the rail", "section 2.3")
+    y_m: float = _key("position ahead", "section 2.3")
+    height_m: float = _key("surveyed height", "section 2.3")
+
+
+class Height(Section):
+    """Inversion of the phase and its unknown constant."""
+
+    reference: Literal["level_ground", "control_points"] = _key(
+        "what fixes the unknown phase constant", "section 2.3"
+    )
+    level_ground: Annotated[tuple[Rectangle, ...], Field(strict=False)] = _key(
+        "ground that the user declares level", "not given"
+    )
+    level_ground_height_m: float = _key("height of the level ground", "not given")
+    control_points: Annotated[tuple[ControlPoint, ...], Field(strict=False)] = _key(
+        "points of known height, one or more", "section 2.3"
+    )
+    trend: Literal["constant", "plane"] = _key(
+        "what is fitted to the reference's phase: a constant, or a plane in x and y", "section 2.3"
+    )
+
+
+class Accuracy(Section):
+    """What the height errors are held against."""
+
+    tolerance_m: float = _key("height error that counts as within", "section 2.3", gt=0)
+
+
+class Target(Section):
+    """A point target of the registration analysis."""
+
+    x_m: float = _key("position along the rail", "section 1.3")
+    y_m: float = _key("position ahead", "section 1.3", gt=0)
+
+
+class Registration(Section):
+    """The analysis of image shifts without registration (Fig. 2)."""
+
+    near: Target = _key("the near target", "section 1.3")
+    far: Target = _key("the far target", "section 1.3")
+    height_min_m: float = _key("lowest target height", "Fig. 2, without a figure")
+    height_max_m: float = _key("highest target height", "Fig. 2, without a figure")
+    height_count: int = _key("number of target heights", "Fig. 2, without a figure", ge=3)
+    map_height_m: float = _key("target height of the map over the scene", "not given")
+
+
+class Figures(Section):
+    """How figures look; nothing here changes a number."""
+
+    height_colormap: str = _key("colour map of heights, truth and reconstruction alike", "Fig. 3")
+    phase_colormap: str = _key("cyclic colour map of wrapped phases", "Fig. 3")
+    amplitude_range_db: float = _key("dynamic range of the images", "Fig. 3", gt=0)
+    png_dpi: int = _key("resolution of the PNG files", "not given", ge=50, le=1200)
+
+
+class Study(Section):
+    """A whole study."""
+
+    study: str = _key(
+        "name of the study; results go to results/<study>",
+        "ours",
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$",
+    )
+    seed: int = _key("seed of everything random", "ours", ge=0)
+    radar: Radar
+    scene: Scene
+    echo: Echo
+    imaging: Imaging
+    interferogram: Interferogram
+    filtering: Filtering
+    unwrapping: Unwrapping
+    height: Height
+    accuracy: Accuracy
+    registration: Registration
+    figures: Figures
+
+    @classmethod
+    def part(cls, values: Mapping[str, Any]) -> Study:
+        """Return a study that has some of its parts and no others.
+
+        A stage gets only the parts that it declares, so that it cannot depend on another unseen.
+
+        Parameters
+        ----------
+        values
+            Sections, as models or as plain values, by name.
+
+        Returns
+        -------
+        Study
+            Reading a part that is not there raises `AttributeError`.
+        """
+        parts: dict[str, Any] = {}
+        for name, value in values.items():
+            kind = cls.model_fields[name].annotation
+            if isinstance(kind, type) and issubclass(kind, Section):
+                parts[name] = kind.model_validate(value)
+            else:
+                parts[name] = value
+        return cls.model_construct(**parts)

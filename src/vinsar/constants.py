@@ -1,0 +1,14 @@
+"""Physical constants and the channel names that every dataset shares."""
+
+from __future__ import annotations
+
+from typing import Final
+
+SPEED_OF_LIGHT: Final = 299_792_458.0
+"""Speed of light in vacuum, m/s (exact by definition of the metre)."""
+
+CHANNELS: Final = ("lower", "upper")
+"""The two interferometric channels: S1 is the lower antenna, S2 the upper one."""
+
+AXES: Final = ("x", "y", "z")
+"""Right-handed axes in metres: x along the rail, y forward, z up."""

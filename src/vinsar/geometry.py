@@ -1,0 +1,333 @@
+"""Ranges, angles and baselines (Eqs. 1-5, 11, 12), and the circle around the aperture axis.
+
+Right-handed metres: x along the rail, y forward, z up; the lower antenna stands at
+``(0, 0, H1)``, the upper at ``(0, B cos(beta), H1 + B sin(beta))``. Angles are in radians.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.floating]
+
+
+def grid_axis(minimum_m: float, maximum_m: float, spacing_m: float) -> Floats:
+    """Return evenly spaced coordinates with both ends included.
+
+    Parameters
+    ----------
+    minimum_m, maximum_m
+        First and last coordinate, m.
+    spacing_m
+        Spacing, m; it must divide the extent.
+
+    Returns
+    -------
+    ndarray
+        Coordinates, m.
+
+    Raises
+    ------
+    ValueError
+        If the extent is not a positive multiple of the spacing.
+    """
+    steps = (maximum_m - minimum_m) / spacing_m
+    count = round(steps)
+    if count < 1 or abs(steps - count) > 1e-6:
+        raise ValueError(
+            f"an extent from {minimum_m} to {maximum_m} m is not a multiple of the spacing "
+            f"{spacing_m} m"
+        )
+    return minimum_m + spacing_m * np.arange(count + 1)
+
+
+def slant_range(position: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Floats:
+    """Return the distance from an antenna to points.
+
+    Parameters
+    ----------
+    position
+        Antenna position (x, y, z), m.
+    x, y, z
+        Points, m, of shapes that broadcast.
+
+    Returns
+    -------
+    ndarray
+        Distance, m.
+    """
+    antenna = np.asarray(position, dtype=float)
+    dx, dy, dz = np.asarray(x) - antenna[0], np.asarray(y) - antenna[1], np.asarray(z) - antenna[2]
+    return np.sqrt(dx**2 + dy**2 + dz**2)
+
+
+def look_angle(position: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Floats:
+    """Return the look angle from nadir (Eq. 9), in radians.
+
+    Eq. 9 has asin, which takes a target above the antenna for one below; atan2 does not.
+    """
+    antenna = np.asarray(position, dtype=float)
+    ground = np.hypot(np.asarray(x) - antenna[0], np.asarray(y) - antenna[1])
+    return np.arctan2(ground, antenna[2] - np.asarray(z))
+
+
+def interferometric_phase(
+    range_lower_m: ArrayLike, range_upper_m: ArrayLike, wavelength_m: float
+) -> Floats:
+    """Return the interferometric phase (Eq. 1), lower minus upper, in radians.
+
+    Each antenna transmits and receives alone.
+
+    Parameters
+    ----------
+    range_lower_m, range_upper_m
+        Slant ranges of the target, m.
+    wavelength_m
+        Wavelength, m.
+
+    Returns
+    -------
+    ndarray
+        Phase, rad.
+    """
+    difference = np.asarray(range_lower_m) - np.asarray(range_upper_m)
+    return -4 * np.pi * difference / wavelength_m
+
+
+def plane_wave_range_difference(
+    baseline_m: float, baseline_angle: float, look: ArrayLike
+) -> Floats:
+    """Return ``r1 - r2`` for a plane wave (Eq. 2), m; angles in radians."""
+    return -baseline_m * np.sin(baseline_angle - np.asarray(look))
+
+
+def baseline_components(
+    baseline_m: float, baseline_angle: float, look: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Return the baseline along and across the line of sight (Eq. 4), m; angles in radians."""
+    angle = baseline_angle - np.asarray(look)
+    return -baseline_m * np.sin(angle), baseline_m * np.cos(angle)
+
+
+def height_per_baseline_length(
+    range_m: ArrayLike, baseline_m: float, baseline_angle: float, look: ArrayLike
+) -> Floats:
+    """Return the height error per error of the baseline's length (Eq. 5), m/m."""
+    _, across = baseline_components(baseline_m, baseline_angle, look)
+    look = np.asarray(look)
+    return np.asarray(range_m) * np.sin(look) * np.sin(baseline_angle - look) / across
+
+
+def height_per_baseline_angle(range_m: ArrayLike, look: ArrayLike) -> Floats:
+    """Return the height error per error of the baseline's attitude (Eq. 12), m/rad."""
+    return np.asarray(range_m) * np.sin(np.asarray(look))
+
+
+def height_of_ambiguity(
+    range_m: ArrayLike,
+    wavelength_m: float,
+    baseline_m: float,
+    baseline_angle: float,
+    look: ArrayLike,
+) -> Floats:
+    """Return the height that turns the phase by a cycle: ``lambda r sin(theta) / 2 B_perp``, m."""
+    _, across = baseline_components(baseline_m, baseline_angle, look)
+    return wavelength_m * np.asarray(range_m) * np.sin(np.asarray(look)) / (2 * across)
+
+
+def critical_baseline(
+    range_m: ArrayLike, wavelength_m: float, look: ArrayLike, range_resolution_m: float
+) -> Floats:
+    """Return the perpendicular baseline that decorrelates level ground, m.
+
+    ``lambda r tan(theta) / (2 rho_r)``: the phase turns by a cycle within a resolution cell.
+    """
+    return wavelength_m * np.asarray(range_m) * np.tan(np.asarray(look)) / (2 * range_resolution_m)
+
+
+def flat_earth_phase(
+    lower: ArrayLike,
+    upper: ArrayLike,
+    x: ArrayLike,
+    y: ArrayLike,
+    wavelength_m: float,
+) -> Floats:
+    """Return the phase of the ground plane (Eq. 11, with the upper antenna's y offset), rad.
+
+    Parameters
+    ----------
+    lower, upper
+        Positions (x, y, z) of the two antennas, m.
+    x, y
+        Points on the ground plane, m, of shapes that broadcast.
+    wavelength_m
+        Wavelength, m.
+
+    Returns
+    -------
+    ndarray
+        Phase, rad, that focusing on the ground plane has removed.
+    """
+    return interferometric_phase(slant_range(lower, x, y), slant_range(upper, x, y), wavelength_m)
+
+
+def circle_image_y(y: ArrayLike, height: ArrayLike, antenna_height: float) -> Floats:
+    """Return where an aperture along x images a raised target on the ground plane.
+
+    Every range ``r^2 = (x - x_l)^2 + y^2 + (H - h)^2`` recurs on the ground at the same x and
+    ``y'^2 = y^2 + (H - h)^2 - H^2``: a circle around the aperture axis.
+
+    Parameters
+    ----------
+    y
+        True distance ahead of the aperture, m.
+    height
+        Height of the target, m.
+    antenna_height
+        Height H of the aperture, m.
+
+    Returns
+    -------
+    ndarray
+        y' in metres; NaN where the circle does not reach the ground.
+    """
+    height = np.asarray(height, dtype=float)
+    square = np.asarray(y) ** 2 + (antenna_height - height) ** 2 - antenna_height**2
+    return np.sqrt(np.where(square >= 0, square, np.nan))
+
+
+def circle_true_y(image_y: ArrayLike, height: ArrayLike, antenna_height: float) -> Floats:
+    """Invert `circle_image_y`: the true y of a target of known height imaged at ``image_y``."""
+    height = np.asarray(height, dtype=float)
+    square = np.asarray(image_y) ** 2 + antenna_height**2 - (antenna_height - height) ** 2
+    return np.sqrt(np.where(square >= 0, square, np.nan))
+
+
+def radial_shift(
+    x: ArrayLike, y: ArrayLike, height: ArrayLike, antenna_height: float
+) -> tuple[Floats, Floats]:
+    """Return the paper's image shift (Eq. 6 with its missing term), in x and y.
+
+    It moves the target radially. That is what a rotating antenna would do; a synthetic aperture
+    moves it along y alone (`circle_image_y`).
+
+    Parameters
+    ----------
+    x, y
+        Target on the ground, m, of shapes that broadcast.
+    height
+        Height of the target, m.
+    antenna_height
+        Height H of the antenna, m.
+
+    Returns
+    -------
+    tuple of ndarray
+        Shifts in x and y, m.
+    """
+    x, y, height = np.broadcast_arrays(
+        np.asarray(x, float), np.asarray(y, float), np.asarray(height, float)
+    )
+    ground = np.hypot(x, y)
+    shift = np.sqrt((antenna_height - height) ** 2 - antenna_height**2 + ground**2) - ground
+    return shift * x / ground, shift * y / ground
+
+
+def circle_shift(
+    x: ArrayLike, y: ArrayLike, height: ArrayLike, antenna_height: float
+) -> tuple[Floats, Floats]:
+    """Return the image shift in x (none) and y by the circle around the aperture axis, m."""
+    x, y, height = np.broadcast_arrays(
+        np.asarray(x, float), np.asarray(y, float), np.asarray(height, float)
+    )
+    return np.zeros_like(x), circle_image_y(y, height, antenna_height) - y
+
+
+def invert_height(
+    range_lower_m: ArrayLike,
+    phase: ArrayLike,
+    *,
+    baseline_m: float,
+    baseline_angle: float,
+    antenna_height: float,
+    along_track: ArrayLike,
+    wavelength_m: float,
+) -> Floats:
+    """Return the height from slant range and absolute phase, exactly, for any baseline angle.
+
+    With r1 from the pixel and ``dr = r1 - r2`` from the phase, the law of cosines in the plane
+    across the aperture gives ``sin(beta - theta) = (r2^2 - r1^2 - B^2) / (2 rho1 B)`` and
+    ``h = H1 - rho1 cos(theta)``, where ``rho1^2 = r1^2 - x^2``. This replaces the paper's Eq. 3.
+
+    Parameters
+    ----------
+    range_lower_m
+        Slant range r1 from the lower antenna, m.
+    phase
+        Absolute interferometric phase, flat-earth phase included, rad.
+    baseline_m, baseline_angle
+        Length, m, and attitude from horizontal, rad, of the baseline.
+    antenna_height
+        Height H1 of the lower antenna, m.
+    along_track
+        Offset x of the target from the centre of the aperture, m.
+    wavelength_m
+        Wavelength, m.
+
+    Returns
+    -------
+    ndarray
+        Height, m; NaN where no look angle fits the phase.
+    """
+    r1 = np.asarray(range_lower_m, dtype=float)
+    r2 = r1 + wavelength_m * np.asarray(phase) / (4 * np.pi)
+    across_range = np.sqrt(r1**2 - np.asarray(along_track) ** 2)
+    sine = (r2**2 - r1**2 - baseline_m**2) / (2 * across_range * baseline_m)
+    angle = np.arcsin(np.where(np.abs(sine) <= 1, sine, np.nan))
+    # arcsin knows the angle up to its mirror image; level ground at this range tells which side.
+    ground_look = np.arccos(np.clip(antenna_height / across_range, -1, 1))
+    angle = np.where(np.cos(baseline_angle - ground_look) < 0, np.pi - angle, angle)
+    look = baseline_angle - angle
+    return antenna_height - across_range * np.cos(look)
+
+
+def printed_height(
+    phase: ArrayLike,
+    look: ArrayLike,
+    *,
+    baseline_m: float,
+    baseline_angle: float,
+    antenna_height: float,
+    wavelength_m: float,
+) -> Floats:
+    """Return the height by Eq. 3 as the paper prints it: wrong, kept to show by how much.
+
+    The numerator's ``lambda phi / 2 pi`` should be ``lambda phi / 4 pi``; use `invert_height`.
+
+    Parameters
+    ----------
+    phase
+        Absolute interferometric phase, rad.
+    look
+        Look angle of the lower antenna, rad.
+    baseline_m, baseline_angle
+        Length, m, and attitude, rad, of the baseline.
+    antenna_height
+        Height of the lower antenna, m.
+    wavelength_m
+        Wavelength, m.
+
+    Returns
+    -------
+    ndarray
+        Height, m.
+    """
+    path = wavelength_m * np.asarray(phase) / (2 * np.pi)
+    look = np.asarray(look)
+    range_ = (path**2 - baseline_m**2) / (2 * baseline_m * np.sin(baseline_angle - look) - path)
+    return antenna_height - range_ * np.cos(look)

@@ -1,0 +1,179 @@
+"""From echoes to complex images: range compression and back-projection."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar import blocks, radar, trajectory, variables
+from vinsar.constants import SPEED_OF_LIGHT
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+logger = logging.getLogger(__name__)
+
+_ROWS_PER_BLOCK = 32
+
+
+def compress(
+    echo: xr.Dataset,
+    *,
+    near_range_m: float,
+    far_range_m: float,
+    window: radar.WindowName = "rectangular",
+    oversampling: int = 16,
+) -> xr.Dataset:
+    """Compress the echo in range, for back-projection by linear interpolation.
+
+    The profile at slant range rho is ``sum_k w_k s_k exp(4 pi i (f_k - f_c) rho / c)`` with weights
+    of sum 1. Linear interpolation between its samples attenuates the band's edges by sinc^2; the
+    weights undo that, so only the spectral images of the interpolation remain as its error.
+
+    Parameters
+    ----------
+    echo
+        Product ``echo``.
+    near_range_m, far_range_m
+        Slant ranges to cover, m.
+    window
+        Weighting of the frequencies.
+    oversampling
+        Range samples per resolution cell ``c / 2W``, at least.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``profiles``.
+
+    Raises
+    ------
+    ValueError
+        If the ranges do not rise, or span more than the unambiguous range.
+    """
+    from scipy import fft
+
+    frequency = echo["frequency"].values
+    count = frequency.size
+    step = float(frequency[-1] - frequency[0]) / (count - 1)
+    unambiguous = radar.unambiguous_range(step)
+    if not 0 <= near_range_m < far_range_m:
+        raise ValueError(f"the ranges {near_range_m} m and {far_range_m} m do not rise from 0")
+    if far_range_m - near_range_m > unambiguous:
+        raise ValueError(
+            f"{far_range_m - near_range_m:.2f} m of slant range exceed the unambiguous range of "
+            f"{unambiguous:.2f} m; take a finer frequency step"
+        )
+    length = fft.next_fast_len(count * oversampling)
+    spacing = unambiguous / length
+    offset = np.arange(count) - (count - 1) / 2
+    weights = radar.window(window, count) / np.sinc(offset / length) ** 2
+    # Two samples to spare on either side for the interpolation.
+    cells = np.arange(
+        int(np.floor(near_range_m / spacing)) - 2, int(np.ceil(far_range_m / spacing)) + 3
+    )
+    spectrum = echo["echo"].values * weights
+    profile = fft.ifft(spectrum, length, axis=-1, norm="forward")[..., cells % length]
+    # The transform's phase runs from the first frequency; the carrier is the band's middle.
+    profile *= np.exp(-2j * np.pi * ((count - 1) / 2 * cells / length % 1))
+    return variables.dataset(
+        "profiles",
+        {
+            "profile": profile.astype(np.complex64),
+            "carrier_frequency": radar.carrier(frequency),
+        },
+        {"slant_range": spacing * cells},
+    )
+
+
+def backproject(
+    profiles: xr.Dataset,
+    trajectory_: xr.Dataset,
+    *,
+    x: NDArray[np.floating],
+    y: NDArray[np.floating],
+    z: ArrayLike = 0.0,
+    window: radar.WindowName = "rectangular",
+) -> xr.Dataset:
+    """Back-project the profiles onto a surface, by default the ground plane.
+
+    ``I(p) = sum_l v_l P_l(rho_l) exp(4 pi i f_c rho_l / c)`` with the exact half path ``rho_l``
+    from transmitter to pixel to receiver and weights of sum 1: a unit point target on the surface
+    gives amplitude 1 and phase 0.
+
+    Parameters
+    ----------
+    profiles
+        Product ``profiles``.
+    trajectory_
+        Product ``trajectory``: the antenna positions as the radar knows them.
+    x, y
+        Axes of the grid, m.
+    z
+        Height of the surface, a number or (y, x), m.
+    window
+        Weighting of the antenna positions.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``images``.
+
+    Raises
+    ------
+    ValueError
+        If profiles and trajectory differ in their positions, or the profiles do not cover the
+        grid.
+    """
+    from vinsar.kernels import backprojection
+
+    samples = profiles["profile"].values
+    transmitter, receiver = trajectory_["transmitter"].values, trajectory_["receiver"].values
+    if samples.shape[:2] != transmitter.shape[:2]:
+        raise ValueError(
+            f"profiles of {samples.shape[:2]} channels and positions do not fit a trajectory of "
+            f"{transmitter.shape[:2]}"
+        )
+    slant_range = profiles["slant_range"].values
+    near, far = trajectory.range_extent(trajectory_, x, y, z)
+    if near < slant_range[0] or far > slant_range[-1]:
+        raise ValueError(
+            f"the profiles cover {slant_range[0]:.2f} to {slant_range[-1]:.2f} m of slant range, "
+            f"but the grid needs {near:.2f} to {far:.2f} m"
+        )
+    weights = radar.window(window, samples.shape[1])
+    weighted = (samples * weights[:, None]).astype(np.complex64)
+    surface = np.ascontiguousarray(np.broadcast_to(np.asarray(z, dtype=float), (y.size, x.size)))
+    carrier = float(profiles["carrier_frequency"])
+    image = np.zeros((samples.shape[0], y.size, x.size), dtype=np.complex64)
+    spacing = float(slant_range[-1] - slant_range[0]) / (slant_range.size - 1)
+
+    def work(channel: int, begin: int) -> None:
+        rows = slice(begin, begin + _ROWS_PER_BLOCK)
+        backprojection.accumulate(
+            image[channel, rows], x, y[rows], surface[rows], transmitter[channel],
+            receiver[channel], weighted[channel], float(slant_range[0]), spacing,
+            2 * carrier / SPEED_OF_LIGHT,
+        )  # fmt: skip
+
+    blocks.run(
+        work,
+        (
+            (channel, begin)
+            for channel in range(samples.shape[0])
+            for begin in range(0, y.size, _ROWS_PER_BLOCK)
+        ),
+    )
+    logger.info("back-projected %d x %d pixels from %d positions", *image.shape[1:], len(weights))
+    return variables.dataset(
+        "images",
+        {
+            "image": image,
+            "wavelength": radar.wavelength(carrier),
+            "phase_center": trajectory.phase_centers(trajectory_),
+        },
+        {"x": x, "y": y},
+    )

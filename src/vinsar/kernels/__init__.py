@@ -1,0 +1,1 @@
+"""Numba loops over plain arrays: serial, without the interpreter lock, compiled once and cached."""

@@ -1,0 +1,102 @@
+"""Where the antennas are: positions of transmitter and receiver by channel and position."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar import geometry, variables
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+
+def rail(
+    *,
+    aperture_length_m: float,
+    position_spacing_m: float,
+    rail_height_m: float,
+    baseline_m: float,
+    baseline_angle_deg: float,
+) -> xr.Dataset:
+    """Return the positions of two monostatic antennas on one cart that runs along a roof rail.
+
+    The rail is centred on x = 0 at y = 0; the lower antenna runs at the rail's height, the upper
+    one a baseline away from it in the plane across the rail.
+
+    Parameters
+    ----------
+    aperture_length_m
+        Distance between the first and the last position, m.
+    position_spacing_m
+        Spacing of the positions, m; it must divide the length.
+    rail_height_m
+        Height H0 of the lower antenna, m.
+    baseline_m
+        Distance B between the antennas, m.
+    baseline_angle_deg
+        Attitude beta of the baseline from horizontal, degrees; 90 is vertical.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory``: ``transmitter`` and ``receiver`` (channel, position, axis), m.
+
+    Raises
+    ------
+    ValueError
+        If the spacing does not divide the length.
+    """
+    half = aperture_length_m / 2
+    x = geometry.grid_axis(-half, half, position_spacing_m)
+    beta = np.deg2rad(baseline_angle_deg)
+    antennas = np.zeros((2, x.size, 3))
+    antennas[..., 0] = x
+    antennas[..., 2] = rail_height_m
+    # The paper's vertical baseline has no y offset at all, not 1e-17 m.
+    antennas[1, :, 1] += baseline_m * (0.0 if baseline_angle_deg == 90 else np.cos(beta))
+    antennas[1, :, 2] += baseline_m * np.sin(beta)
+    return variables.dataset("trajectory", {"transmitter": antennas, "receiver": antennas.copy()})
+
+
+def phase_centers(trajectory: xr.Dataset) -> np.ndarray:
+    """Return the aperture's centre of each channel.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``.
+
+    Returns
+    -------
+    ndarray, shape (channel, axis)
+        Mean over positions of the midpoint between transmitter and receiver, m.
+    """
+    midpoint = (trajectory["transmitter"].values + trajectory["receiver"].values) / 2
+    return np.asarray(midpoint.mean(axis=1))
+
+
+def range_extent(
+    trajectory: xr.Dataset, x: NDArray[np.floating], y: NDArray[np.floating], z: ArrayLike = 0.0
+) -> tuple[float, float]:
+    """Return the least and the largest slant range between any antenna and a grid, m.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``.
+    x, y
+        Axes of the grid, m.
+    z
+        Heights of the surface, m; its extremes count.
+    """
+    antennas = np.stack([trajectory["transmitter"].values, trajectory["receiver"].values])
+    z = np.asarray(z, dtype=float)
+    least, most = np.zeros(antennas.shape[:-1]), np.zeros(antennas.shape[:-1])
+    for axis, (low, high) in enumerate(((x[0], x[-1]), (y[0], y[-1]), (z.min(), z.max()))):
+        place = antennas[..., axis]
+        least += np.maximum(np.maximum(low - place, place - high), 0) ** 2
+        most += np.maximum(np.abs(low - place), np.abs(high - place)) ** 2
+    return float(np.sqrt(least.min())), float(np.sqrt(most.max()))

@@ -1,0 +1,384 @@
+"""Every variable of every product, declared once: dimensions, type, unit, name, meaning.
+
+`dataset` is the one way to make a product; `check` refuses what departs from the declaration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import xarray as xr
+
+from vinsar.constants import AXES, CHANNELS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Kind = Literal["real", "complex", "integer", "flag", "label"]
+
+DTYPES: dict[Kind, tuple[str, ...]] = {
+    "real": ("float32", "float64"),
+    "complex": ("complex64", "complex128"),
+    "integer": ("int8", "int16", "int32", "int64", "uint32"),
+    "flag": ("bool",),
+    "label": ("str",),
+}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What a variable is.
+
+    Attributes
+    ----------
+    dims
+        Names of its dimensions, in order.
+    kind
+        What its values are; `DTYPES` has the types allowed.
+    units
+        UDUNITS string; "1" where there is none, "" for labels.
+    long_name
+        What a plot writes on the axis.
+    comment
+        Sign convention and meaning, where they matter.
+    flag_meanings
+        For flags: the words for false and true.
+    attributes
+        Other attributes.
+    """
+
+    dims: tuple[str, ...]
+    kind: Kind
+    units: str
+    long_name: str
+    comment: str = ""
+    flag_meanings: str = ""
+    attributes: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def attrs(self) -> dict[str, str]:
+        """The attributes that the variable carries."""
+        attrs = {"long_name": self.long_name}
+        if self.units:
+            attrs["units"] = self.units
+        if self.comment:
+            attrs["comment"] = self.comment
+        if self.flag_meanings:
+            attrs["flag_meanings"] = self.flag_meanings
+        return attrs | self.attributes
+
+
+_GRID = ("y", "x")
+
+COORDINATES: dict[str, Variable] = {
+    "channel": Variable(
+        ("channel",), "label", "", "interferometric channel", "lower is S1, upper is S2"
+    ),
+    "axis": Variable(("axis",), "label", "", "axis of a position"),
+    "ground_axis": Variable(("ground_axis",), "label", "", "axis on the ground plane"),
+    "position": Variable(("position",), "integer", "1", "number of the antenna position"),
+    "frequency": Variable(("frequency",), "real", "Hz", "frequency"),
+    "slant_range": Variable(
+        ("slant_range",), "real", "m", "slant range", "half of the path out and back"
+    ),
+    "x": Variable(
+        ("x",), "real", "m", "x (along the rail)", "positive to the right", "", {"axis": "X"}
+    ),
+    "y": Variable(("y",), "real", "m", "y (ahead of the vehicle)", "", "", {"axis": "Y"}),
+    "facet": Variable(("facet",), "integer", "1", "number of the facet"),
+    "target": Variable(("target",), "label", "", "point target"),
+    "target_height": Variable(("target_height",), "real", "m", "height of the point target"),
+    "region": Variable(("region",), "label", "", "part of the scene"),
+}
+
+_ANTENNA = ("channel", "position", "axis")
+_SHIFT = ("ground_axis", "target", "target_height")
+
+PRODUCTS: dict[str, dict[str, Variable]] = {
+    "trajectory": {
+        "transmitter": Variable(_ANTENNA, "real", "m", "position of the transmitting antenna"),
+        "receiver": Variable(_ANTENNA, "real", "m", "position of the receiving antenna"),
+    },
+    "terrain": {
+        "height": Variable(_GRID, "real", "m", "true height above the ground plane"),
+        "reflectivity": Variable(_GRID, "real", "1", "reflectivity of the scene"),
+    },
+    "facets": {
+        "facet_position": Variable(("facet", "axis"), "real", "m", "position of the facet"),
+        "reflectivity": Variable(("facet",), "real", "1", "reflectivity of the facet"),
+    },
+    "visibility": {
+        "visible": Variable(
+            ("channel", "position", "facet"),
+            "flag",
+            "1",
+            "facet seen from the transmitter and the receiver (Eq. 8)",
+            flag_meanings="hidden visible",
+        ),
+    },
+    "truth": {
+        "height": Variable(_GRID, "real", "m", "true height on the DEM's grid"),
+        "reflectivity": Variable(_GRID, "real", "1", "reflectivity on the DEM's grid"),
+        "visible_fraction": Variable(
+            ("channel", "y", "x"), "real", "1", "share of the antenna positions that see the cell"
+        ),
+        "shadow": Variable(
+            _GRID,
+            "flag",
+            "1",
+            "cell hidden from either antenna at more than half of the positions",
+            flag_meanings="visible shadow",
+        ),
+    },
+    "echo": {
+        "echo": Variable(
+            ("channel", "position", "frequency"),
+            "complex",
+            "1",
+            "stepped-frequency echo",
+            "a path R out and back gives the phase -2 pi f R / c",
+        ),
+    },
+    "profiles": {
+        "profile": Variable(
+            ("channel", "position", "slant_range"),
+            "complex",
+            "1",
+            "range-compressed profile",
+            "at baseband: the carrier's phase over the slant-range axis is removed; "
+            "a unit point target peaks at 1",
+        ),
+        "carrier_frequency": Variable((), "real", "Hz", "carrier frequency of the profiles"),
+    },
+    "images": {
+        "image": Variable(
+            ("channel", "y", "x"),
+            "complex",
+            "1",
+            "complex image focused on the ground plane",
+            "a unit point target on the ground plane gives amplitude 1 and phase 0",
+        ),
+        "wavelength": Variable((), "real", "m", "wavelength of the carrier"),
+        "phase_center": Variable(
+            ("channel", "axis"), "real", "m", "centre of the aperture of the channel"
+        ),
+    },
+    "interferogram": {
+        "interferogram": Variable(
+            _GRID, "complex", "1", "interferogram, lower times conjugate upper (Eq. 10)"
+        ),
+        "coherence": Variable(_GRID, "real", "1", "multilooked coherence magnitude"),
+    },
+    "filtered": {
+        "interferogram": Variable(_GRID, "complex", "1", "filtered interferogram"),
+    },
+    "unwrapped": {
+        "phase": Variable(
+            _GRID,
+            "real",
+            "radian",
+            "unwrapped interferometric phase without the flat-earth phase",
+            "lower minus upper; known up to one constant",
+        ),
+        "residue": Variable(
+            _GRID,
+            "integer",
+            "1",
+            "residue of the filtered phase",
+            "winding number of the four cells whose least x and y are this one's: -1, 0 or 1",
+        ),
+    },
+    "dem": {
+        "height": Variable(_GRID, "real", "m", "reconstructed height above the ground plane"),
+        "image_height": Variable(
+            _GRID, "real", "m", "height at the image's pixel, before DEM coding"
+        ),
+        "absolute_phase": Variable(
+            _GRID,
+            "real",
+            "radian",
+            "absolute interferometric phase at the image's pixel",
+            "lower minus upper, flat-earth phase included (Eq. 11)",
+        ),
+        "phase_offset": Variable(
+            _GRID, "real", "radian", "phase added to fit the reference heights"
+        ),
+    },
+    "accuracy": {
+        "height_error": Variable(_GRID, "real", "m", "height error, reconstructed minus true"),
+        "shadow": Variable(
+            _GRID,
+            "flag",
+            "1",
+            "cell hidden from either antenna at more than half of the positions",
+            flag_meanings="visible shadow",
+        ),
+        "mean": Variable(("region",), "real", "m", "mean height error"),
+        "std": Variable(("region",), "real", "m", "standard deviation of the height error"),
+        "median": Variable(("region",), "real", "m", "median height error"),
+        "mad": Variable(("region",), "real", "m", "median absolute deviation of the height error"),
+        "percentile_95_absolute": Variable(
+            ("region",), "real", "m", "95th percentile of the absolute height error"
+        ),
+        "maximum_absolute": Variable(("region",), "real", "m", "largest absolute height error"),
+        "fraction_within_tolerance": Variable(
+            ("region",),
+            "real",
+            "1",
+            "share of the region's cells with an error within the tolerance",
+        ),
+        "fraction_reconstructed": Variable(
+            ("region",), "real", "1", "share of the region's cells that have a height"
+        ),
+        "cell_count": Variable(("region",), "integer", "1", "number of cells in the region"),
+        "tolerance": Variable((), "real", "m", "height error that counts as within"),
+    },
+    "registration": {
+        "radial": Variable(
+            _SHIFT, "real", "m", "registration error, radial shift (Eqs. 6-7)", "lower minus upper"
+        ),
+        "circle": Variable(
+            _SHIFT,
+            "real",
+            "m",
+            "registration error, circle around the aperture axis",
+            "lower minus upper",
+        ),
+        "measured": Variable(
+            _SHIFT,
+            "real",
+            "m",
+            "registration error measured on imaged point targets",
+            "lower minus upper",
+        ),
+        "image_shift": Variable(
+            ("channel", "ground_axis", "target", "target_height"),
+            "real",
+            "m",
+            "measured displacement of the imaged point target from its position",
+        ),
+        "target_position": Variable(
+            ("target", "ground_axis"), "real", "m", "position of the target on the ground"
+        ),
+        "resolution": Variable(
+            ("ground_axis", "target"), "real", "m", "resolution on the ground at the target"
+        ),
+        "map_radial": Variable(
+            ("ground_axis", "y", "x"),
+            "real",
+            "m",
+            "registration error over the scene, radial shift (Eqs. 6-7)",
+            "lower minus upper",
+        ),
+        "map_circle": Variable(
+            ("ground_axis", "y", "x"),
+            "real",
+            "m",
+            "registration error over the scene, circle around the aperture axis",
+            "lower minus upper",
+        ),
+        "map_resolution": Variable(
+            ("ground_axis", "y", "x"), "real", "m", "resolution on the ground over the scene"
+        ),
+        "map_height": Variable((), "real", "m", "target height of the maps"),
+    },
+}
+
+LABELS: dict[str, tuple[str, ...]] = {"channel": CHANNELS, "axis": AXES, "ground_axis": AXES[:2]}
+
+
+def dataset(
+    product: str, data: Mapping[str, Any], coords: Mapping[str, Any] | None = None
+) -> xr.Dataset:
+    """Make a product from plain arrays, with the declared dimensions and attributes.
+
+    Parameters
+    ----------
+    product
+        A key of `PRODUCTS`.
+    data
+        An array or scalar for each declared variable.
+    coords
+        The coordinates' values; `channel`, `axis` and plain counts are filled in.
+
+    Returns
+    -------
+    xarray.Dataset
+        The labelled product.
+
+    Raises
+    ------
+    ValueError
+        If a variable is missing, undeclared, or of other shape or type than declared.
+    """
+    declared = PRODUCTS[product]
+    result = xr.Dataset()
+    for name, values in data.items():
+        if name not in declared:
+            raise ValueError(f"product '{product}' has no variable '{name}'")
+        array = np.asarray(values)
+        dims = declared[name].dims
+        if array.ndim != len(dims):
+            raise ValueError(
+                f"'{name}' of product '{product}' has {array.ndim} dimensions, "
+                f"but {dims} are declared"
+            )
+        result[name] = (dims, array, declared[name].attrs)
+    coords = dict(coords or {})
+    for dim in result.dims:
+        name = str(dim)
+        if name not in coords:
+            coords[name] = LABELS[name] if name in LABELS else np.arange(result.sizes[dim])
+    # A dataset written twice is the same bytes only if its coordinates come in one order.
+    for name in sorted(set(coords) & {str(dim) for dim in result.dims}):
+        result = result.assign_coords({name: (name, np.asarray(coords[name]))})
+        result[name].attrs = COORDINATES[name].attrs
+    check(result, product)
+    return result
+
+
+def check(data: xr.Dataset, product: str) -> None:
+    """Refuse a dataset that departs from the product's declaration.
+
+    Parameters
+    ----------
+    data
+        The dataset.
+    product
+        A key of `PRODUCTS`.
+
+    Raises
+    ------
+    ValueError
+        Names the first variable that is missing, undeclared, or departs in dimensions, type or
+        attributes, with what is declared.
+    """
+    declared = PRODUCTS[product]
+    dims = {dim for variable in declared.values() for dim in variable.dims}
+    expected = declared | {dim: COORDINATES[dim] for dim in dims}
+    found = {str(name) for name in data.variables}
+    for name in sorted(set(expected) - found):
+        raise ValueError(f"product '{product}' lacks the variable '{name}'")
+    for name in sorted(found - set(expected)):
+        raise ValueError(f"product '{product}' has no variable '{name}'")
+    for name, variable in expected.items():
+        array = data[name]
+        if array.dims != variable.dims:
+            raise ValueError(
+                f"'{name}' of product '{product}' has the dimensions {array.dims}, "
+                f"but {variable.dims} are declared"
+            )
+        kind = "str" if array.dtype.kind in "UOT" else array.dtype.name
+        if kind not in DTYPES[variable.kind]:
+            raise ValueError(
+                f"'{name}' of product '{product}' is {array.dtype}, "
+                f"but {' or '.join(DTYPES[variable.kind])} is declared"
+            )
+        for attribute, value in variable.attrs.items():
+            if array.attrs.get(attribute) != value:
+                raise ValueError(
+                    f"'{name}' of product '{product}' has {attribute}="
+                    f"{array.attrs.get(attribute)!r}, but {value!r} is declared"
+                )
