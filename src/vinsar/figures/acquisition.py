@@ -1,0 +1,400 @@
+"""Fig. 1: the geometry of the acquisition, drawn to scale from the configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar import geometry, radar
+from vinsar.figures import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
+    from numpy.typing import NDArray
+
+    from vinsar import config
+    from vinsar.pipeline import Products
+
+_GROUND, _SCENE, _VEHICLE = "#b8a98f", "#9fc2a2", "#dfe2e5"
+_DIMENSION = {
+    "arrowstyle": "<->",
+    "linewidth": 0.6,
+    "shrinkA": 0,
+    "shrinkB": 0,
+    "mutation_scale": 6,
+}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The antennas and a target in the plane x = 0, and what follows from them.
+
+    Attributes
+    ----------
+    lower, upper, target
+        Positions (y, z) of S1, S2 and T, m.
+    """
+
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    target: NDArray[np.float64]
+    baseline: float
+    beta: float
+
+    @property
+    def ranges(self) -> tuple[float, float]:
+        """Slant ranges r1 and r2, m."""
+        lower, upper = (np.linalg.norm(self.target - s) for s in (self.lower, self.upper))
+        return float(lower), float(upper)
+
+    @property
+    def look(self) -> float:
+        """Look angle theta of S1 from nadir, rad."""
+        return float(geometry.look_angle((0, *self.lower), 0, *self.target))
+
+
+def layout(study: config.Study) -> Layout:
+    """Return the geometry of a study, with the target on a top in the middle of its scene.
+
+    Parameters
+    ----------
+    study
+        The configuration.
+
+    Returns
+    -------
+    Layout
+        Positions in the plane x = 0.
+    """
+    beta = np.deg2rad(study.radar.baseline_angle_deg)
+    lower = np.array([0.0, study.radar.rail_height_m])
+    step = study.radar.baseline_m * np.array([np.cos(beta), np.sin(beta)])
+    middle = (study.scene.y_min_m + study.scene.y_max_m) / 2
+    return Layout(
+        lower,
+        lower + step,
+        np.array([middle, study.scene.peak_height_m]),
+        study.radar.baseline_m,
+        float(beta),
+    )
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw Fig. 1.
+
+    Parameters
+    ----------
+    products
+        None are read.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    del products
+    scheme = layout(study)
+    left, width, below = 11.0, 166.0, 76.0
+    view = _side_limits(scheme, study)
+    height = width * (view[3] - view[2]) / (view[1] - view[0])
+    figure = style.new_figure(style.TWO_COLUMNS_MM, below + 26 + height)
+    side = style.place(figure, left, below + 20, width, height)
+    _side(side, scheme, study, view)
+    _near_antennas(style.place(figure, 13, 10, 66, 66), scheme)
+    _values(style.place(figure, 85, 10, 44, 66), study)
+    _plan(style.place(figure, 142, 10, 35, 66), scheme, study, 66 / 35)
+    return figure
+
+
+def _side_limits(scheme: Layout, study: config.Study) -> tuple[float, float, float, float]:
+    far = max(study.scene.y_max_m, study.imaging.y_max_m)
+    near = min(-1.5 * scheme.lower[1], scheme.upper[1] - scheme.baseline)
+    top = max(scheme.lower[1], scheme.upper[1], scheme.target[1])
+    span = 1.05 * (far - near)
+    return (near, near + span, -0.02 * span, max(top + 0.035 * span, 0.12 * span))
+
+
+def _side(
+    axes: Axes, scheme: Layout, study: config.Study, view: tuple[float, float, float, float]
+) -> None:
+    from matplotlib.patches import Arc, Rectangle
+
+    axes.set_xlim(*view[:2])
+    axes.set_ylim(*view[2:])
+    axes.set_aspect("equal")
+    span = view[1] - view[0]
+    unit = span / 166  # a millimetre on paper, in metres
+    axes.axhspan(view[2], 0, color=_GROUND, linewidth=0)
+    scene = (study.scene.y_min_m, study.scene.y_max_m)
+    axes.fill_between(scene, view[2], 0, color=_SCENE, linewidth=0)
+    axes.text(
+        float(np.mean(scene)),
+        -0.5 * unit,
+        f"scene, {scene[0]:g} … {scene[1]:g} m ahead",
+        ha="center",
+        va="top",
+        fontsize=6.5,
+    )
+    _vehicle(axes, scheme.lower[1])
+    target, lower, upper = scheme.target, scheme.lower, scheme.upper
+    r1, r2 = scheme.ranges
+    for antenna, colour in ((lower, style.BLUE), (upper, style.ORANGE)):
+        axes.plot(*zip(antenna, target, strict=True), color=colour, linewidth=0.8)
+        axes.plot(*antenna, "o", color=colour, markersize=3, zorder=5)
+    axes.plot(*target, "^", color=style.INK, markersize=5, zorder=5)
+    for antenna, text, colour, offset in (
+        (lower, f"$r_1$ = {r1:.3f} m", style.BLUE, -1.0),
+        (upper, f"$r_2$ = {r2:.3f} m", style.ORANGE, 1.0),
+    ):
+        step = target - antenna
+        at = antenna + 0.55 * step
+        axes.text(
+            at[0],
+            at[1] + offset * unit,
+            text,
+            color=colour,
+            ha="center",
+            va="top" if offset < 0 else "bottom",
+            rotation=float(np.degrees(np.arctan2(step[1], step[0]))),
+            rotation_mode="anchor",
+        )
+    axes.annotate("", (0, 0), tuple(lower), arrowprops=_DIMENSION)
+    axes.text(
+        -unit, 0.42 * lower[1], f"$H_0$ = {lower[1]:g} m", ha="right", va="center", fontsize=7
+    )
+    radius = 0.5 * lower[1]
+    look = np.degrees(scheme.look)
+    axes.add_patch(
+        Arc(tuple(lower), 2 * radius, 2 * radius, theta1=-90, theta2=look - 90, linewidth=0.6)
+    )
+    axes.text(
+        *(lower + (radius + unit) * np.array([np.sin(scheme.look / 2), -np.cos(scheme.look / 2)])),
+        r"$\theta$",
+        ha="left",
+        va="top",
+    )
+    axes.plot([target[0], target[0]], [0, target[1]], color=style.INK, linewidth=0.8)
+    axes.annotate(f"T, $h$ = {target[1]:g} m", tuple(target), (5, 2), textcoords="offset points")
+    zoom = _zoom_limits(scheme)
+    axes.add_patch(
+        Rectangle(
+            (zoom[0], zoom[2]),
+            zoom[1] - zoom[0],
+            zoom[3] - zoom[2],
+            fill=False,
+            edgecolor=style.GREY,
+            linewidth=0.6,
+            linestyle=":",
+        )
+    )
+    axes.annotate(
+        "(b)", (zoom[1], zoom[3]), (2, 0), textcoords="offset points", va="top", fontsize=6.5
+    )
+    axes.set_xlabel("y, ahead (m)")
+    axes.set_ylabel("z (m)")
+    axes.set_title("(a) side view in the plane x = 0, to scale (vehicle schematic)")
+
+
+def _vehicle(axes: Axes, height: float) -> None:
+    """Draw a vehicle of the rail's height; its shape stands for none in particular."""
+    from matplotlib.patches import Circle, Polygon
+
+    outline = np.array(
+        [(-1.4, 0.2), (-1.4, 0.93), (0.1, 0.93), (0.32, 0.58), (0.72, 0.5), (0.76, 0.2)]
+    )
+    axes.add_patch(
+        Polygon(outline * height, facecolor=_VEHICLE, edgecolor=style.GREY, linewidth=0.6)
+    )
+    for at in (-1.02, 0.38):
+        axes.add_patch(
+            Circle((at * height, 0.17 * height), 0.17 * height, facecolor="#70757a", linewidth=0)
+        )
+
+
+def _zoom_limits(scheme: Layout) -> tuple[float, float, float, float]:
+    """Return the window around the antennas: a few baselines wide, more of it ahead."""
+    middle = (scheme.lower + scheme.upper) / 2
+    half = 1.05 * scheme.baseline
+    return (
+        middle[0] - 0.75 * half,
+        middle[0] + 1.25 * half,
+        middle[1] - half,
+        middle[1] + half,
+    )
+
+
+def _near_antennas(axes: Axes, scheme: Layout) -> None:
+    from matplotlib.patches import Arc
+
+    view = _zoom_limits(scheme)
+    axes.set_xlim(*view[:2])
+    axes.set_ylim(*view[2:])
+    axes.set_aspect("equal")
+    lower, upper, size = scheme.lower, scheme.upper, scheme.baseline
+    beta, look = np.degrees(scheme.beta), np.degrees(scheme.look)
+    dashed = {"color": style.GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
+    axes.plot([lower[0], view[1]], [lower[1], lower[1]], **dashed)
+    axes.plot([lower[0], lower[0]], [lower[1], view[2]], **dashed)
+    axes.plot(*zip(lower, upper, strict=True), color=style.INK, linewidth=1.6, zorder=4)
+    for antenna, symbol, colour, side in (
+        (lower, "r_1", style.BLUE, -1),
+        (upper, "r_2", style.ORANGE, 1),
+    ):
+        axes.plot(*zip(antenna, scheme.target, strict=True), color=colour)
+        axes.plot(*antenna, "o", color=colour, markersize=5, zorder=5)
+        at_y = view[1] - 0.18 * size
+        step = scheme.target - antenna
+        at_z = antenna[1] + (at_y - antenna[0]) * step[1] / step[0]
+        axes.annotate(
+            f"${symbol}$ to T",
+            (at_y, at_z),
+            (0, 3 * side),
+            textcoords="offset points",
+            color=colour,
+            ha="center",
+            va="bottom" if side > 0 else "top",
+        )
+    for antenna, name in ((lower, "$S_1$"), (upper, "$S_2$")):
+        axes.annotate(
+            name, tuple(antenna), (-5, 0), textcoords="offset points", ha="right", va="center"
+        )
+    normal = np.array([-np.sin(scheme.beta), np.cos(scheme.beta)])
+    axes.annotate(
+        f"$B$ = {size:g} m",
+        tuple((lower + upper) / 2),
+        tuple(6 * normal),
+        textcoords="offset points",
+        ha="right" if normal[0] < -0.3 else "center",
+        va="center" if normal[0] < -0.3 else "bottom",
+    )
+    for radius, start, stop, text in (
+        (0.42, 0.0, beta, f"$\beta$ = {beta:g}°"),
+        (0.30, -90.0, look - 90, f"$\theta$ = {look:.2f}°"),
+    ):
+        span = 2 * radius * size
+        axes.add_patch(Arc(tuple(lower), span, span, theta1=start, theta2=stop, linewidth=0.8))
+        middle = np.deg2rad((start + stop) / 2)
+        axes.annotate(
+            text,
+            tuple(lower + radius * size * np.array([np.cos(middle), np.sin(middle)])),
+            (3 * np.cos(middle), 3 * np.sin(middle)),
+            textcoords="offset points",
+            va="center",
+        )
+    axes.set_xlabel("y, ahead (m)")
+    axes.set_ylabel("z (m)")
+    axes.set_title("(b) the antennas, to scale")
+
+
+def values(study: config.Study) -> list[tuple[str, str]]:
+    """Return the quantities that Fig. 1 lists, as symbol or name and value.
+
+    Parameters
+    ----------
+    study
+        The configuration.
+
+    Returns
+    -------
+    list of tuple of str
+        What the configuration sets; then, after an empty row, what follows for the target T.
+    """
+    scheme, options = layout(study), study.radar
+    wavelength = radar.wavelength((options.start_frequency_hz + options.stop_frequency_hz) / 2)
+    bandwidth = options.stop_frequency_hz - options.start_frequency_hz
+    r1, r2 = scheme.ranges
+    along, across = geometry.baseline_components(scheme.baseline, scheme.beta, scheme.look)
+    ambiguity = geometry.height_of_ambiguity(
+        r1, wavelength, scheme.baseline, scheme.beta, scheme.look
+    )
+    positions = round(options.aperture_length_m / options.position_spacing_m) + 1
+    azimuth = radar.azimuth_resolution(wavelength, r1, options.aperture_length_m)
+    return [
+        (
+            "frequency",
+            f"{options.start_frequency_hz / 1e9:g} … {options.stop_frequency_hz / 1e9:g} GHz",
+        ),
+        (r"wavelength $\lambda$", f"{1000 * wavelength:.1f} mm"),
+        ("aperture $L$", f"{options.aperture_length_m:g} m"),
+        ("positions", f"{positions}"),
+        ("rail height $H_0$", f"{options.rail_height_m:g} m"),
+        ("baseline $B$", f"{scheme.baseline:g} m"),
+        (r"its attitude $\beta$", f"{options.baseline_angle_deg:g}°"),
+        ("", ""),
+        (r"look angle $\theta$", f"{np.degrees(scheme.look):.2f}°"),
+        (r"$\Delta r = r_1 - r_2$", _signed(1000 * (r1 - r2), ".1f", "mm")),
+        (r"$B_\parallel$", _signed(1000 * float(along), ".1f", "mm")),
+        (r"$B_\perp$", _signed(1000 * float(across), ".1f", "mm")),
+        ("height of ambiguity", _signed(float(ambiguity), ".3f", "m")),
+        ("resolution, range", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
+        ("resolution, x", f"{100 * float(azimuth):.1f} cm"),
+    ]
+
+
+def _signed(value: float, form: str, unit: str) -> str:
+    return f"{value:{form}} {unit}".replace("-", "−")
+
+
+def _values(axes: Axes, study: config.Study) -> None:
+    rows = values(study)
+    axes.set_axis_off()
+    axes.set_xlim(0, 1)
+    axes.set_ylim(len(rows) + 0.5, -0.5)
+    axes.set_title("The radar")
+    for row, (name, value) in enumerate(rows):
+        if name:
+            axes.text(0, row, name, va="center")
+            axes.text(1, row, value, va="center", ha="right")
+        else:
+            axes.text(0, row + 0.1, "At the target T", va="center", fontsize=8)
+
+
+def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None:
+    """Draw the plan; `shape` is the axes' height over width."""
+    from matplotlib.patches import Rectangle
+
+    scene, image = study.scene, study.imaging
+    rail = study.radar.rail_height_m
+    # The vehicle's hood in the plan, of the proportions of the side view.
+    body = (-0.45 * rail, -1.4 * rail, 0.9 * rail, 2.16 * rail)
+    near, far = -1.5 * rail, 1.04 * max(scene.y_max_m, image.y_max_m)
+    half = max(abs(edge) for area in (scene, image) for edge in (area.x_min_m, area.x_max_m))
+    half = 1.1 * max(half, body[2] / 2, study.radar.aperture_length_m / 2)
+    half = max(half, (far - near) / shape / 2)
+    far = max(far, near + 2 * half * shape)
+    axes.set_xlim(-half, half)
+    axes.set_ylim(near, far)
+    axes.set_aspect("equal")
+    axes.add_patch(
+        Rectangle(body[:2], *body[2:], facecolor=_VEHICLE, edgecolor=style.GREY, linewidth=0.6)
+    )
+    axes.add_patch(_area(scene, facecolor=_SCENE, edgecolor="none"))
+    axes.add_patch(_area(image, fill=False, edgecolor=style.INK, linewidth=0.7))
+    end = study.radar.aperture_length_m / 2
+    for x in (-end, end):
+        axes.plot([x, 0], [0, scheme.target[0]], color=style.BLUE, linewidth=0.5)
+    axes.plot([-end, end], [0, 0], color=style.BLUE, linewidth=2.2, solid_capstyle="butt")
+    axes.plot(0, scheme.target[0], "^", color=style.INK, markersize=5, zorder=5)
+    axes.annotate("T", (0, scheme.target[0]), (4, 0), textcoords="offset points", va="center")
+    axes.annotate("$L$", (end, 0), (3, 0), textcoords="offset points", va="center")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y, ahead (m)")
+    axes.set_title("(c) plan, to scale")
+
+
+def _area(area: config.Scene | config.Imaging, **look: Any) -> Rectangle:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle(
+        (area.x_min_m, area.y_min_m),
+        area.x_max_m - area.x_min_m,
+        area.y_max_m - area.y_min_m,
+        **look,
+    )

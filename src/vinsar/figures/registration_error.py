@@ -1,0 +1,155 @@
+"""Fig. 2: how far the two images shift against each other, by the height of the target."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar.figures import maps, style
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from vinsar import config
+    from vinsar.pipeline import Products
+
+# A tenth of a resolution cell is what the paper allows without registration (section 1.3).
+_ALLOWED_SHARE = 0.1
+_HEIGHT_MM = 88.0
+_NAMES = {"near": "near target", "far": "far target"}
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw Fig. 2.
+
+    Parameters
+    ----------
+    products
+        ``registration``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    del study
+    registration = products["registration"]
+    figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
+    lefts, bottoms, width, height = (13.0, 56.5), (53.0, 16.0), 41.0, 29.5
+    letters = iter("abcd")
+    for ground_axis, bottom in zip(("x", "y"), bottoms, strict=True):
+        limit = _limit(registration, ground_axis)
+        for target, left in zip(registration["target"].values, lefts, strict=True):
+            axes = style.place(figure, left, bottom, width, height)
+            _curves(axes, registration, ground_axis, str(target), limit)
+            axes.set_title(_title(registration, ground_axis, str(target), next(letters)))
+            axes.tick_params(labelbottom=ground_axis == "y", labelleft=target == "near")
+            if ground_axis == "y":
+                axes.set_xlabel("target height (m)")
+            if target == "near":
+                axes.set_ylabel(f"error in {ground_axis} (mm)")
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="lower left",
+        ncols=4,
+        bbox_to_anchor=(lefts[0] / style.TWO_COLUMNS_MM, 1.5 / _HEIGHT_MM),
+        borderpad=0,
+        borderaxespad=0,
+        columnspacing=1.4,
+    )
+    _map(figure, registration)
+    return figure
+
+
+def _limit(registration: xr.Dataset, ground_axis: str) -> float:
+    """Return the limit of the error axis of a row of panels, mm: as far as its curves need."""
+    part = registration.sel(ground_axis=ground_axis)
+    largest = max(float(np.abs(part[name]).max()) for name in ("radial", "circle", "measured"))
+    bands = _ALLOWED_SHARE * part["resolution"].values
+    # The edge of a band a little beyond the curves is worth the room; one far beyond is not.
+    near = bands[bands < 1.6 * largest]
+    return 1000 * 1.15 * max([largest, *near])
+
+
+def _curves(
+    axes: Axes, registration: xr.Dataset, ground_axis: str, target: str, limit: float
+) -> None:
+    part = registration.sel(ground_axis=ground_axis, target=target)
+    height = part["target_height"].values
+    allowed = 1000 * _ALLOWED_SHARE * float(part["resolution"])
+    axes.axhspan(
+        -allowed, allowed, color="#e3ebf2", linewidth=0, zorder=0, label="a tenth of a cell"
+    )
+    axes.axhline(0, color=style.GREY, linewidth=0.5, zorder=1)
+    axes.plot(
+        height,
+        1000 * part["radial"].values,
+        color=style.ORANGE,
+        linestyle="--",
+        label="radial (Eq. 7)",
+    )
+    axes.plot(height, 1000 * part["circle"].values, color=style.BLUE, label="circle")
+    axes.plot(
+        height,
+        1000 * part["measured"].values,
+        color=style.INK,
+        linestyle="none",
+        marker="o",
+        markerfacecolor="none",
+        markeredgewidth=0.7,
+        label="measured on images",
+    )
+    axes.set_ylim(-limit, limit)
+    margin = 0.04 * (height[-1] - height[0])
+    axes.set_xlim(height[0] - margin, height[-1] + margin)
+    rises = part["circle"].values[-1] >= part["circle"].values[0]
+    axes.text(
+        0.97,
+        0.05 if rises else 0.95,
+        f"± {allowed:.1f} mm{'' if allowed < limit else ', beyond the axis'}",
+        transform=axes.transAxes,
+        ha="right",
+        va="bottom" if rises else "top",
+    )
+
+
+def _title(registration: xr.Dataset, ground_axis: str, target: str, letter: str) -> str:
+    x, y = registration["target_position"].sel(target=target).values
+    name = _NAMES.get(target, target)
+    return f"({letter}) in {ground_axis}, {name} ({x:g}, {y:g}) m"
+
+
+def _map(figure: Figure, registration: xr.Dataset) -> None:
+    """Draw the error by the circle over the scene, in tenths of a resolution cell."""
+    part = registration.sel(ground_axis="y")
+    share = np.abs(part["map_circle"]) / (_ALLOWED_SHARE * part["map_resolution"])
+    width, height = maps.fit(share, 54, 66.5)
+    axes = style.place(figure, 109, 16, width, height)
+    # White is exactly a tenth of a cell: blue needs no registration, red does.
+    reach = min(1.0, max(0.1, float(np.ceil(10 * np.nanmax(np.abs(share.values - 1))) / 10)))
+    limits = (1 - reach, 1 + reach)
+    image = maps.draw(axes, share, colormap=style.colormap("cmc.vik"), limits=limits)
+    drawn = np.nanmin(share.values) < 1 < np.nanmax(share.values)
+    if drawn:
+        axes.contour(
+            share["x"].values,
+            share["y"].values,
+            share.values,
+            levels=[1.0],
+            colors="black",
+            linewidths=0.8,
+        )
+    axes.set_title(f"(e) in y by the circle, target height {float(registration['map_height']):g} m")
+    bar = maps.colorbar(
+        axes, image, "error / a tenth of a cell", extend=maps.beyond(share.values, limits)
+    )
+    if drawn:
+        bar.ax.axhline(1, color="black", linewidth=0.8)

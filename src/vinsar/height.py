@@ -1,0 +1,222 @@
+"""From unwrapped phase to a digital elevation model: constant, inversion, DEM coding."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from vinsar import geometry, variables
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+
+logger = logging.getLogger(__name__)
+
+Trend = Literal["constant", "plane"]
+Extent = tuple[float, float, float, float]
+
+
+def level_ground(
+    x: Floats, y: Floats, rectangles: Sequence[Extent], height_m: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return the grid's points on ground that the user declares level.
+
+    Parameters
+    ----------
+    x, y
+        Axes of the grid, m.
+    rectangles
+        Extents (x_min, x_max, y_min, y_max), m.
+    height_m
+        Height of the level ground, m.
+
+    Returns
+    -------
+    tuple of ndarray
+        x, y and height of the points, m.
+
+    Raises
+    ------
+    ValueError
+        If no point of the grid is on the declared ground.
+    """
+    grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
+    inside = np.zeros(grid_x.shape, bool)
+    for x_min, x_max, y_min, y_max in rectangles:
+        inside |= (grid_x >= x_min) & (grid_x <= x_max) & (grid_y >= y_min) & (grid_y <= y_max)
+    if not inside.any():
+        raise ValueError("no pixel of the grid lies on the ground declared level")
+    return grid_x[inside], grid_y[inside], np.full(int(inside.sum()), height_m)
+
+
+def phase_offset(
+    unwrapped: xr.Dataset,
+    images: xr.Dataset,
+    points: tuple[Floats, Floats, Floats],
+    *,
+    trend: Trend = "constant",
+) -> Floats:
+    """Return the phase to add so that reference points come out at their known heights.
+
+    Unwrapping leaves one constant unknown. Each reference point tells it: its absolute phase is
+    known (Eq. 1), and so is the pixel where it is imaged. The constant is the median over points,
+    the plane a fit by least absolute deviations, so that single bad pixels do not count.
+
+    Parameters
+    ----------
+    unwrapped, images
+        Products of these names.
+    points
+        x, y and height of the reference points, m.
+    trend
+        What to fit.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Phase to add, rad.
+
+    Raises
+    ------
+    ValueError
+        If a reference point is imaged outside the grid, or there are too few for the trend.
+    """
+    from scipy.ndimage import map_coordinates
+
+    x, y = unwrapped["x"].values, unwrapped["y"].values
+    lower, upper = images["phase_center"].values
+    wavelength = float(images["wavelength"])
+    point_x, point_y, point_height = points
+    image_y = lower[1] + geometry.circle_image_y(point_y - lower[1], point_height, lower[2])
+    column = (point_x - x[0]) / (x[1] - x[0])
+    row = (image_y - y[0]) / (y[1] - y[0])
+    # A pixel's width of tolerance: declared ground may end at the image's edge.
+    inside = (row > -1) & (row < y.size) & (column > -1) & (column < x.size)
+    if not inside.all():
+        first = int(np.argmin(inside))
+        raise ValueError(
+            f"the reference point at x = {point_x[first]:.2f} m, y = {point_y[first]:.2f} m is "
+            "imaged outside the grid"
+        )
+    absolute = geometry.interferometric_phase(
+        geometry.slant_range(lower, point_x, point_y, point_height),
+        geometry.slant_range(upper, point_x, point_y, point_height),
+        wavelength,
+    )
+    flat = geometry.flat_earth_phase(lower, upper, point_x, image_y, wavelength)
+    found = map_coordinates(unwrapped["phase"].values, [row, column], order=1, mode="nearest")
+    missing = absolute - flat - found
+    if trend == "constant":
+        return np.full((y.size, x.size), np.median(missing))
+    if len(missing) < 3:
+        raise ValueError(f"a plane needs three or more reference points, not {len(missing)}")
+    design = np.stack([np.ones_like(point_x), point_x, image_y - y[0]], axis=1)
+    constant, slope_x, slope_y = _least_absolute(design, missing)
+    return np.asarray(constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0]))
+
+
+def _least_absolute(design: Floats, values: Floats) -> Floats:
+    # Iteratively reweighted least squares; its weights are bounded at a milliradian.
+    weights: Floats = np.ones(values.size)
+    solution: Floats = np.zeros(design.shape[1])
+    for _ in range(50):
+        root = np.sqrt(weights)
+        solution, *_ = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)
+        weights = 1 / np.maximum(np.abs(values - design @ solution), 1e-3)
+    return solution
+
+
+def code_dem(
+    image_height: Floats, x: Floats, y: Floats, *, antenna_y: float, antenna_height: float
+) -> Floats:
+    """Move the image's heights to their true positions and resample them to the grid.
+
+    A pixel at (x, y') with height h belongs to (x, y) on the circle around the aperture axis
+    (`geometry.circle_true_y`): the paper's DEM coding. Along each column the heights are then
+    interpolated linearly. Where parts overlap (layover) they come in the order of y.
+
+    Parameters
+    ----------
+    image_height
+        Heights at the image's pixels (y, x), m.
+    x, y
+        Axes of image and DEM, m.
+    antenna_y, antenna_height
+        Position of the lower aperture across its axis, m.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Heights on the grid, m; NaN more than a pixel beyond the outermost known height.
+    """
+    true_y = antenna_y + geometry.circle_true_y(
+        y[:, None] - antenna_y, image_height, antenna_height
+    )
+    spacing = y[1] - y[0]
+    result = np.full_like(image_height, np.nan)
+    for column in range(x.size):
+        known = np.isfinite(true_y[:, column])
+        if not known.any():
+            continue
+        order = np.argsort(true_y[known, column], kind="stable")
+        place = true_y[known, column][order]
+        result[:, column] = np.interp(y, place, image_height[known, column][order])
+        beyond = (y < place[0] - spacing) | (y > place[-1] + spacing)
+        result[beyond, column] = np.nan
+    return result
+
+
+def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Dataset:
+    """Invert the unwrapped phase to heights and code the DEM.
+
+    The flat-earth phase (Eq. 11), which focusing on the ground plane has removed, is added back;
+    `geometry.invert_height` gives the height at the image's pixel, `code_dem` its true place.
+
+    Parameters
+    ----------
+    unwrapped, images
+        Products of these names.
+    offset
+        Phase to add (y, x), from `phase_offset`, rad.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``dem``.
+    """
+    x, y = unwrapped["x"].values, unwrapped["y"].values
+    lower, upper = images["phase_center"].values
+    wavelength = float(images["wavelength"])
+    flat = geometry.flat_earth_phase(lower, upper, x[None, :], y[:, None], wavelength)
+    absolute = unwrapped["phase"].values + flat + offset
+    across, up = upper[1] - lower[1], upper[2] - lower[2]
+    image_height = geometry.invert_height(
+        geometry.slant_range(lower, x[None, :], y[:, None]),
+        absolute,
+        baseline_m=float(np.hypot(across, up)),
+        baseline_angle=float(np.arctan2(up, across)),
+        antenna_height=float(lower[2]),
+        along_track=x[None, :] - lower[0],
+        wavelength_m=wavelength,
+    )
+    height = code_dem(image_height, x, y, antenna_y=float(lower[1]), antenna_height=float(lower[2]))
+    unknown = int(np.isnan(height).sum())
+    if unknown:
+        logger.warning("%d of %d cells of the DEM have no height", unknown, height.size)
+    return variables.dataset(
+        "dem",
+        {
+            "height": height,
+            "image_height": image_height,
+            "absolute_phase": absolute,
+            "phase_offset": offset,
+        },
+        {"x": x, "y": y},
+    )

@@ -1,0 +1,149 @@
+"""Where a result comes from: configuration, inputs, code and versions, as text attributes."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import vinsar
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+_PACKAGE = Path(vinsar.__file__).parent
+_LIBRARIES = (
+    "dask", "finufft", "kamui", "matplotlib", "netCDF4", "numba", "numpy", "scikit-image", "scipy",
+    "whirlwind-insar", "xarray",
+)  # fmt: skip
+
+
+def sources_of(*modules: str) -> list[Path]:
+    """Return the files of modules and of all they import within the package.
+
+    Parameters
+    ----------
+    modules
+        Names within the package, such as ``filtering`` or ``kernels.fan``.
+
+    Returns
+    -------
+    list of Path
+        Sorted, each once.
+
+    Raises
+    ------
+    ValueError
+        If there is no such module.
+    """
+    found: set[Path] = set()
+    waiting = [_file_of(name) for name in modules]
+    for name, path in zip(modules, waiting, strict=True):
+        if path is None:
+            raise ValueError(f"vinsar has no module '{name}'")
+    while waiting:
+        path = waiting.pop()
+        if path is not None and path not in found:
+            found.add(path)
+            waiting.extend(_imports(path))
+    return sorted(found)
+
+
+def _file_of(name: str) -> Path | None:
+    place = _PACKAGE.joinpath(*name.split("."))
+    for candidate in (place.with_suffix(".py"), place / "__init__.py"):
+        if candidate.is_file():
+            return candidate
+    return None
+
+
+@cache
+def _imports(path: Path) -> tuple[Path, ...]:
+    found: set[Path | None] = set()
+    for node in _run_nodes(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            top, _, inner = node.module.partition(".")
+            if top == "vinsar":
+                # What is imported is a module of its own, or a name in the module imported from.
+                for alias in node.names:
+                    member = f"{inner}.{alias.name}" if inner else alias.name
+                    found.add(_file_of(member) or (_file_of(inner) if inner else None))
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                top, _, inner = alias.name.partition(".")
+                if top == "vinsar" and inner:
+                    found.add(_file_of(inner))
+    return tuple(sorted(path for path in found if path is not None))
+
+
+def _run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """Walk a syntax tree without what stands there for type checkers alone."""
+    for node in ast.iter_child_nodes(tree):
+        typing_only = (
+            isinstance(node, ast.If)
+            and isinstance(node.test, ast.Name)
+            and node.test.id == "TYPE_CHECKING"
+        )
+        if not typing_only:
+            yield node
+            yield from _run_nodes(node)
+
+
+def sha256(path: str | Path) -> str:
+    """Return the SHA-256 of a file's bytes, in hexadecimal."""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def code_digest(paths: Iterable[str | Path]) -> str:
+    """Return one SHA-256 over source files, whatever folder the package lies in."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(path) for path in paths):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def describe(
+    *,
+    study: str,
+    stage: str,
+    configuration: Mapping[str, Any],
+    inputs: Mapping[str, str | Path],
+    code: Iterable[str | Path],
+) -> dict[str, str]:
+    """Return the attributes that say where a result comes from.
+
+    The same inputs give the same text: no time, host or path is in it.
+
+    Parameters
+    ----------
+    study
+        Name of the study.
+    stage
+        Name of the stage or figure.
+    configuration
+        The sections that it depends on.
+    inputs
+        The files that it read, by name of the product.
+    code
+        The source files that it ran.
+
+    Returns
+    -------
+    dict of str
+        Attributes; structured ones as JSON.
+    """
+    versions = {name: metadata.version(name) for name in _LIBRARIES}
+    return {
+        "source": f"vinsar {vinsar.__version__}",
+        "vinsar_study": study,
+        "vinsar_stage": stage,
+        "vinsar_configuration": json.dumps(configuration, sort_keys=True),
+        "vinsar_inputs": json.dumps({name: sha256(inputs[name]) for name in sorted(inputs)}),
+        "vinsar_code": code_digest(code),
+        "vinsar_libraries": json.dumps(versions, sort_keys=True),
+    }

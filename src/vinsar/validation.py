@@ -1,0 +1,571 @@
+"""The configuration held against its own bounds and against radar physics, before anything runs.
+
+All faults come in one message: each with the key's path, its value, and what is allowed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import re
+import typing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from vinsar import config, geometry, radar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping
+
+    Rule = Callable[..., Iterator["Fault"]]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A key that is wrong.
+
+    Attributes
+    ----------
+    key
+        Path of the key, such as ``radar.baseline_m``.
+    value
+        What it holds, if it exists.
+    allowed
+        What would be right.
+    """
+
+    key: str
+    value: Any
+    allowed: str
+
+    def __str__(self) -> str:
+        value = "" if self.value is None else f" = {self.value!r}"
+        return f"{self.key}{value}: {self.allowed}"
+
+
+class ConfigurationError(ValueError):
+    """A configuration with faults.
+
+    Attributes
+    ----------
+    faults
+        All that were found.
+    """
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(faults)
+        count = len(self.faults)
+        lines = "".join(f"\n  {fault}" for fault in self.faults)
+        super().__init__(f"The configuration has {count} fault{'s' * (count > 1)}:{lines}")
+
+
+def load(*paths: str | Path) -> config.Study:
+    """Read configuration files, each overriding the ones before it, and check the result.
+
+    Parameters
+    ----------
+    paths
+        YAML files; the first is usually ``config/paper.yaml``, which has every key.
+
+    Returns
+    -------
+    config.Study
+        The checked configuration.
+
+    Raises
+    ------
+    ConfigurationError
+        If anything is wrong with it.
+    ValueError
+        If a file cannot be read as YAML.
+    """
+    import yaml
+
+    merged: dict[str, Any] = {}
+    for path in map(Path, paths):
+        try:
+            content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+        except (OSError, yaml.YAMLError) as error:
+            raise ValueError(f"cannot read the configuration {path}: {error}") from error
+        if not isinstance(content, dict):
+            raise ValueError(f"{path} holds {type(content).__name__}; keys with values are needed")
+        merged = _merge(merged, content)
+    return check(merged)
+
+
+def _merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any]:
+    result = dict(base)
+    for key, value in override.items():
+        old = result.get(key)
+        deeper = isinstance(value, dict) and isinstance(old, dict)
+        result[key] = _merge(old or {}, value) if deeper else value
+    return result
+
+
+def check(raw: Mapping[str, Any]) -> config.Study:
+    """Check a configuration and return it as a study.
+
+    Parameters
+    ----------
+    raw
+        Every key with its value, as read from YAML.
+
+    Returns
+    -------
+    config.Study
+        The checked configuration.
+
+    Raises
+    ------
+    ConfigurationError
+        If anything is wrong with it.
+    """
+    faults: list[Fault] = []
+    valid: dict[str, Any] = {}
+    try:
+        study = config.Study.model_validate(raw)
+        valid = {name: getattr(study, name) for name in config.Study.model_fields}
+    except ValidationError as error:
+        faults = [_fault(item) for item in error.errors()]
+        wrong = {fault.key.split(".")[0].split("[")[0] for fault in faults}
+        valid = {
+            name: field.annotation.model_validate(raw[name])
+            for name, field in config.Study.model_fields.items()
+            if name not in wrong
+            and isinstance(field.annotation, type)
+            and issubclass(field.annotation, BaseModel)
+        }
+    # A section that is wrong by itself would only confuse the rules that come after.
+    for rules in (_WITHIN_SECTIONS, (_ahead,), _ACROSS_SECTIONS):
+        found = list(_apply(rules, valid))
+        faults += found
+        for fault in found:
+            valid.pop(fault.key.split(".")[0], None)
+    if faults:
+        raise ConfigurationError(faults)
+    return study
+
+
+def advice(study: config.Study) -> list[str]:
+    """Return what is allowed but unwise in a checked configuration, a sentence each."""
+    sections = {name: getattr(study, name) for name in config.Study.model_fields}
+    return [str(fault) for fault in _apply(_UNWISE, sections)]
+
+
+def _apply(rules: Iterable[Rule], sections: Mapping[str, Any]) -> Iterator[Fault]:
+    """Apply the rules whose sections, named by their parameters, are all there."""
+    for rule in rules:
+        names = list(inspect.signature(rule).parameters)
+        if all(name in sections for name in names):
+            yield from rule(*(sections[name] for name in names))
+
+
+def _fault(error: Any) -> Fault:
+    path = ""
+    for part in error["loc"]:
+        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
+    value = error["input"]
+    if error["type"] == "missing":
+        return Fault(path, None, "missing; config/paper.yaml shows it with its value")
+    if error["type"] == "extra_forbidden":
+        return Fault(path, value, "unknown key" + _nearest(path))
+    allowed = error["msg"].replace("Input should", "must").replace("String should", "must")
+    if isinstance(value, str) and error["type"] in {"float_type", "int_type"}:
+        try:
+            number = float(value)
+        except ValueError:
+            pass
+        else:
+            # YAML 1.1 reads 13e9 as text.
+            allowed += f" (YAML reads this as text; write {number:.15g})"
+    return Fault(path, value, allowed)
+
+
+def _nearest(path: str) -> str:
+    known = list(_keys(config.Study))
+    parent, _, name = re.sub(r"\[\d+\]", "", path).rpartition(".")
+    siblings = [key for key in known if key.rpartition(".")[0] == parent]
+    names = {key.rpartition(".")[2]: key for key in known}
+    # The nearest name in the same section first, then anywhere.
+    for candidates in ({key.rpartition(".")[2]: key for key in siblings}, names):
+        close = difflib.get_close_matches(name, candidates, n=1, cutoff=0.6)
+        if close:
+            return f"; did you mean {candidates[close[0]]}?"
+    listed = ", ".join(key.rpartition(".")[2] for key in siblings)
+    return f"; there are {listed}" if listed else ""
+
+
+def _keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    for name, field in model.model_fields.items():
+        yield prefix + name
+        # A key's own model, or that of the items of a list.
+        for kind in (field.annotation, *typing.get_args(field.annotation)):
+            if inspect.isclass(kind) and issubclass(kind, BaseModel):
+                yield from _keys(kind, f"{prefix}{name}.")
+
+
+def _extent(section: str, part: Any) -> Iterator[Fault]:
+    for axis in "xy":
+        low, high = getattr(part, f"{axis}_min_m"), getattr(part, f"{axis}_max_m")
+        if low >= high:
+            yield Fault(f"{section}.{axis}_max_m", high, f"must exceed {axis}_min_m, {low}")
+
+
+def _multiple(key: str, value: float, low: float, high: float, spacing: float) -> Iterator[Fault]:
+    try:
+        geometry.grid_axis(low, high, spacing)
+    except ValueError:
+        count = max(1, round((high - low) / spacing))
+        yield Fault(
+            key,
+            value,
+            f"must divide the extent from {low:g} to {high:g} m; {(high - low) / count:.6g} would",
+        )
+
+
+def _waveform(radar: config.Radar) -> Iterator[Fault]:
+    if radar.start_frequency_hz >= radar.stop_frequency_hz:
+        yield Fault(
+            "radar.stop_frequency_hz",
+            radar.stop_frequency_hz,
+            f"must exceed radar.start_frequency_hz, {radar.start_frequency_hz:g}",
+        )
+    half = radar.aperture_length_m / 2
+    yield from _multiple(
+        "radar.position_spacing_m", radar.position_spacing_m, -half, half, radar.position_spacing_m
+    )
+
+
+def _scene_raster(scene: config.Scene) -> Iterator[Fault]:
+    faults = list(_extent("scene", scene))
+    yield from faults
+    if faults:
+        return
+    for axis in "xy":
+        low, high = getattr(scene, f"{axis}_min_m"), getattr(scene, f"{axis}_max_m")
+        yield from _multiple(
+            "scene.terrain_spacing_m",
+            scene.terrain_spacing_m,
+            low,
+            high,
+            scene.terrain_spacing_m,
+        )
+        if scene.facet_size_m > high - low:
+            yield Fault(
+                "scene.facet_size_m", scene.facet_size_m, f"must be at most {high - low:g} m"
+            )
+    if scene.terrain_spacing_m > scene.facet_size_m:
+        yield Fault(
+            "scene.terrain_spacing_m",
+            scene.terrain_spacing_m,
+            f"must be at most the facet size, {scene.facet_size_m} m",
+        )
+    # The deepest hollow of `peaks` is 0.81 times as deep as its highest top is high.
+    least = 0.0 if scene.terrain == "flat" else 0.8083 * scene.peak_height_m
+    if scene.reflectivity_offset < least:
+        yield Fault(
+            "scene.reflectivity_offset",
+            scene.reflectivity_offset,
+            f"must be at least {least:.3f}, or the deepest hollow has a negative reflectivity",
+        )
+
+
+def _image_grid(imaging: config.Imaging) -> Iterator[Fault]:
+    faults = list(_extent("imaging", imaging))
+    yield from faults
+    if faults:
+        return
+    for axis in "xy":
+        low, high = getattr(imaging, f"{axis}_min_m"), getattr(imaging, f"{axis}_max_m")
+        yield from _multiple(
+            "imaging.grid_spacing_m", imaging.grid_spacing_m, low, high, imaging.grid_spacing_m
+        )
+
+
+def _odd_windows(
+    interferogram: config.Interferogram, filtering: config.Filtering
+) -> Iterator[Fault]:
+    for key, value in (
+        ("interferogram.coherence_window_px", interferogram.coherence_window_px),
+        ("filtering.boxcar_window_px", filtering.boxcar_window_px),
+    ):
+        if value % 2 == 0:
+            yield Fault(key, value, "must be odd")
+
+
+def _goldstein_step(filtering: config.Filtering) -> Iterator[Fault]:
+    patch, step = filtering.goldstein_patch_px, filtering.goldstein_step_px
+    if patch % step or patch < 2 * step:
+        steps = [n for n in range(1, patch // 2 + 1) if patch % n == 0]
+        yield Fault(
+            "filtering.goldstein_step_px",
+            step,
+            f"must divide filtering.goldstein_patch_px, {patch}, at least twice: "
+            + ", ".join(map(str, steps)),
+        )
+
+
+def _heights_rise(registration: config.Registration) -> Iterator[Fault]:
+    if registration.height_min_m >= registration.height_max_m:
+        yield Fault(
+            "registration.height_max_m",
+            registration.height_max_m,
+            f"must exceed registration.height_min_m, {registration.height_min_m}",
+        )
+
+
+def _reference_exists(height: config.Height) -> Iterator[Fault]:
+    for number, rectangle in enumerate(height.level_ground):
+        yield from _extent(f"height.level_ground[{number}]", rectangle)
+    if height.reference == "level_ground" and not height.level_ground:
+        yield Fault("height.level_ground", (), "must hold one rectangle or more")
+    if height.reference == "control_points":
+        least = 3 if height.trend == "plane" else 1
+        if len(height.control_points) < least:
+            yield Fault(
+                "height.control_points",
+                f"{len(height.control_points)} points",
+                f"must hold {least} or more for height.trend '{height.trend}'",
+            )
+
+
+def _reference_in_image(height: config.Height, imaging: config.Imaging) -> Iterator[Fault]:
+    where = (
+        f"x {imaging.x_min_m:g} to {imaging.x_max_m:g} m, "
+        f"y {imaging.y_min_m:g} to {imaging.y_max_m:g} m"
+    )
+
+    def inside(x: float, y: float) -> bool:
+        return imaging.x_min_m <= x <= imaging.x_max_m and imaging.y_min_m <= y <= imaging.y_max_m
+
+    if height.reference == "level_ground":
+        for number, part in enumerate(height.level_ground):
+            corners = ((part.x_min_m, part.y_min_m), (part.x_max_m, part.y_max_m))
+            if not all(inside(*corner) for corner in corners):
+                yield Fault(
+                    f"height.level_ground[{number}]", corners, f"must lie in the image: {where}"
+                )
+    else:
+        for number, point in enumerate(height.control_points):
+            if not inside(point.x_m, point.y_m):
+                yield Fault(
+                    f"height.control_points[{number}]",
+                    (point.x_m, point.y_m),
+                    f"must lie in the image: {where}",
+                )
+
+
+@dataclass(frozen=True)
+class _Derived:
+    """What the rules need of the radar."""
+
+    frequency: Any
+    wavelength: float
+    shortest_wavelength: float
+    range_cell: float
+    unambiguous_range: float
+    lower: Any
+    upper: Any
+
+    @classmethod
+    def of(cls, section: config.Radar) -> _Derived:
+        frequency = radar.frequencies(
+            section.start_frequency_hz, section.stop_frequency_hz, section.frequency_count
+        )
+        beta = np.deg2rad(section.baseline_angle_deg)
+        return cls(
+            frequency=frequency,
+            wavelength=radar.wavelength(radar.carrier(frequency)),
+            shortest_wavelength=radar.wavelength(section.stop_frequency_hz),
+            range_cell=radar.range_resolution(float(frequency[-1] - frequency[0])),
+            unambiguous_range=radar.unambiguous_range(float(frequency[1] - frequency[0])),
+            lower=np.array([0.0, 0.0, section.rail_height_m]),
+            upper=np.array(
+                [
+                    0.0,
+                    section.baseline_m * np.cos(beta),
+                    section.rail_height_m + section.baseline_m * np.sin(beta),
+                ]
+            ),
+        )
+
+
+def _ahead(radar: config.Radar, scene: config.Scene, imaging: config.Imaging) -> Iterator[Fault]:
+    # Half a wavelength would do for the mathematics; a facet does for the visibility.
+    foremost = max(0.0, float(_Derived.of(radar).upper[1])) + scene.facet_size_m
+    for name, part in (("scene", scene), ("imaging", imaging)):
+        if part.y_min_m < foremost:
+            yield Fault(
+                f"{name}.y_min_m",
+                part.y_min_m,
+                f"must be {foremost:.3g} m or more: the antennas look ahead and stand at y = 0",
+            )
+
+
+def _unambiguous(
+    radar: config.Radar, scene: config.Scene, imaging: config.Imaging
+) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    half = radar.aperture_length_m / 2
+    for name, part in (("scene", scene), ("imaging", imaging)):
+        lateral = max(abs(part.x_min_m), abs(part.x_max_m)) + half
+        far = float(np.hypot(np.hypot(lateral, part.y_max_m), derived.upper[2]))
+        if far > derived.unambiguous_range:
+            count = int(np.ceil((radar.frequency_count - 1) * far / derived.unambiguous_range)) + 1
+            yield Fault(
+                f"{name}.y_max_m",
+                part.y_max_m,
+                f"its farthest slant range of {far:.2f} m must be within the unambiguous range, "
+                f"{derived.unambiguous_range:.2f} m; take radar.frequency_count {count} or more",
+            )
+
+
+def _facets_fine(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    half = _cell(radar, scene) / 2
+    if scene.facet_size_m > half:
+        yield Fault(
+            "scene.facet_size_m",
+            scene.facet_size_m,
+            f"must be at most half a resolution cell, {half:.4f} m",
+        )
+
+
+def _grid_fine(radar: config.Radar, imaging: config.Imaging) -> Iterator[Fault]:
+    cell = _cell(radar, imaging)
+    if imaging.grid_spacing_m > cell:
+        yield Fault(
+            "imaging.grid_spacing_m",
+            imaging.grid_spacing_m,
+            f"must be at most the resolution, {cell:.4f} m",
+        )
+
+
+def _cell(radar_: config.Radar, part: config.Scene | config.Imaging) -> float:
+    """Return the finest resolution in a part of the ground, m."""
+    derived = _Derived.of(radar_)
+    x = np.clip(0.0, part.x_min_m, part.x_max_m)
+    cells = [
+        radar.ground_resolution(
+            derived.lower, np.asarray(x), np.asarray(y),
+            aperture_length_m=radar_.aperture_length_m, frequency=derived.frequency,
+        )
+        for y in (part.y_min_m, part.y_max_m)
+    ]  # fmt: skip
+    return float(np.min(cells))
+
+
+def _positions_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    half = radar.aperture_length_m / 2
+    # Echoes from the sines s1 and s2 of the squint are told apart while the phase between
+    # neighbouring positions, 4 pi d (s1 - s2) / lambda, stays within a turn.
+    edge = np.array([scene.x_min_m - half, scene.x_max_m + half])
+    sine = edge / np.hypot(np.hypot(edge, scene.y_min_m), derived.lower[2])
+    most = derived.shortest_wavelength / (2 * float(sine[1] - sine[0]))
+    if radar.position_spacing_m > most:
+        yield Fault(
+            "radar.position_spacing_m",
+            radar.position_spacing_m,
+            f"must be at most {most:.4f} m, or the scene's width is imaged ambiguously",
+        )
+
+
+def _targets_imaged(radar: config.Radar, registration: config.Registration) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    foremost = max(0.0, float(derived.upper[1]))
+    for name, target in (("near", registration.near), ("far", registration.far)):
+        ahead = target.y_m - foremost
+        heights = np.array([registration.height_min_m, registration.height_max_m])
+        if (
+            ahead <= 0
+            or np.isnan(geometry.circle_image_y(ahead, heights, float(derived.upper[2]))).any()
+        ):
+            yield Fault(
+                f"registration.{name}.y_m",
+                target.y_m,
+                "must be farther ahead: a target of these heights has no image on the ground",
+            )
+
+
+def _colormaps(figures: config.Figures) -> Iterator[Fault]:
+    import matplotlib as mpl
+    from cmcrameri import cm
+
+    for key in ("height_colormap", "phase_colormap"):
+        name = getattr(figures, key)
+        prefix, _, short = name.partition(".")
+        known = cm.cmaps if prefix == "cmc" and short else mpl.colormaps
+        wanted = short if prefix == "cmc" and short else name
+        if wanted not in known:
+            close = difflib.get_close_matches(wanted, list(known), n=1)
+            hint = (
+                f"; did you mean {'cmc.' if known is cm.cmaps else ''}{close[0]}?" if close else ""
+            )
+            yield Fault(f"figures.{key}", name, f"no colour map of matplotlib or cmcrameri{hint}")
+
+
+def _baseline_short(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    x = float(np.clip(0.0, scene.x_min_m, scene.x_max_m))
+    look = geometry.look_angle(derived.lower, x, scene.y_min_m)
+    range_ = geometry.slant_range(derived.lower, x, scene.y_min_m)
+    limit = geometry.critical_baseline(range_, derived.wavelength, look, derived.range_cell) / 4
+    _, across = geometry.baseline_components(
+        radar.baseline_m, np.deg2rad(radar.baseline_angle_deg), look
+    )
+    if abs(across) > limit:
+        yield Fault(
+            "radar.baseline_m",
+            radar.baseline_m,
+            f"its part across the line of sight, {abs(float(across)):.3f} m, exceeds a quarter of "
+            f"the critical baseline, {float(limit):.3f} m, at the scene's near edge: coherence "
+            "will suffer",
+        )
+
+
+def _facets_coarse(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    if scene.facet_size_m < derived.wavelength:
+        yield Fault(
+            "scene.facet_size_m",
+            scene.facet_size_m,
+            f"is below the wavelength, {derived.wavelength:.4f} m: many facets for little",
+        )
+
+
+def _image_in_scene(scene: config.Scene, imaging: config.Imaging) -> Iterator[Fault]:
+    outside = (
+        imaging.x_min_m < scene.x_min_m
+        or imaging.x_max_m > scene.x_max_m
+        or imaging.y_min_m < scene.y_min_m
+        or imaging.y_max_m > scene.y_max_m
+    )
+    if outside:
+        yield Fault(
+            "imaging", None, "the image reaches beyond the scene: nothing scatters there but noise"
+        )
+
+
+_WITHIN_SECTIONS: tuple[Rule, ...] = (
+    _waveform,
+    _scene_raster,
+    _image_grid,
+    _goldstein_step,
+    _heights_rise,
+    _reference_exists,
+    _colormaps,
+)
+_ACROSS_SECTIONS: tuple[Rule, ...] = (
+    _odd_windows,
+    _reference_in_image,
+    _unambiguous,
+    _facets_fine,
+    _grid_fine,
+    _positions_dense,
+    _targets_imaged,
+)
+_UNWISE: tuple[Rule, ...] = (_baseline_short, _facets_coarse, _image_in_scene)
