@@ -1,0 +1,41 @@
+# The study as a workflow: ./run, or ./run -n to see what it would do.
+# config/paper.yaml holds every value; --configfile config/<study>.yaml overrides some of them.
+from snakemake.utils import min_version
+
+min_version("9.27")
+
+
+configfile: "config/paper.yaml"
+
+
+include: "workflow/rules/common.smk"
+
+
+pathvars:
+    results=f"results/{STUDY.study}",
+    logs="<results>/logs",
+    benchmarks="<results>/benchmarks",
+
+
+include: "workflow/rules/scene.smk"
+include: "workflow/rules/echo.smk"
+include: "workflow/rules/imaging.smk"
+include: "workflow/rules/registration.smk"
+include: "workflow/rules/interferogram.smk"
+include: "workflow/rules/height.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        expand("<results>/{product}.nc", product=pipeline.STAGES),
+        expand(
+            "<results>/figures/{figure}.{suffix}",
+            figure=figures.FIGURES,
+            suffix=SUFFIXES,
+        ),
+        "<results>/accuracy.json",
+        "<results>/claims.json",
+        "<results>/claims.md",

@@ -1,0 +1,53 @@
+# From the unwrapped phase to heights and their errors.
+
+
+rule dem:
+    input:
+        unwrapped="<results>/unwrapped.nc",
+        images="<results>/images.nc",
+        code=stage_sources("dem"),
+    output:
+        "<results>/dem.nc",
+    log:
+        "<logs>/dem.log",
+    benchmark:
+        "<benchmarks>/dem.tsv"
+    params:
+        configuration=stage_configuration("dem"),
+    script:
+        "../scripts/stage.py"
+
+
+rule accuracy:
+    input:
+        dem="<results>/dem.nc",
+        truth="<results>/truth.nc",
+        code=stage_sources("accuracy"),
+    output:
+        "<results>/accuracy.nc",
+    log:
+        "<logs>/accuracy.log",
+    benchmark:
+        "<benchmarks>/accuracy.tsv"
+    params:
+        configuration=stage_configuration("accuracy"),
+    script:
+        "../scripts/stage.py"
+
+
+rule accuracy_summary:
+    input:
+        accuracy="<results>/accuracy.nc",
+        code=sources_of("accuracy"),
+    output:
+        report(
+            "<results>/accuracy.json",
+            caption="../report/accuracy.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/accuracy_summary.log",
+    benchmark:
+        "<benchmarks>/accuracy_summary.tsv"
+    script:
+        "../scripts/accuracy_summary.py"

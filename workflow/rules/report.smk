@@ -1,0 +1,22 @@
+# The paper's claims against this study's figures.
+
+
+rule claims:
+    input:
+        **{name: f"<results>/{name}.nc" for name in claims.INPUTS},
+        code=sources_of("claims"),
+    output:
+        json=report(
+            "<results>/claims.json",
+            caption="../report/claims.rst",
+            category="Claims",
+        ),
+        markdown="<results>/claims.md",
+    log:
+        "<logs>/claims.log",
+    benchmark:
+        "<benchmarks>/claims.tsv"
+    params:
+        configuration=configuration(*claims.SECTIONS),
+    script:
+        "../scripts/claims.py"

@@ -1,0 +1,84 @@
+# The antennas, the true scene, and what of it the antennas see.
+
+
+rule trajectory:
+    input:
+        code=stage_sources("trajectory"),
+    output:
+        "<results>/trajectory.nc",
+    log:
+        "<logs>/trajectory.log",
+    benchmark:
+        "<benchmarks>/trajectory.tsv"
+    params:
+        configuration=stage_configuration("trajectory"),
+    script:
+        "../scripts/stage.py"
+
+
+rule terrain:
+    input:
+        code=stage_sources("terrain"),
+    output:
+        "<results>/terrain.nc",
+    log:
+        "<logs>/terrain.log",
+    benchmark:
+        "<benchmarks>/terrain.tsv"
+    params:
+        configuration=stage_configuration("terrain"),
+    script:
+        "../scripts/stage.py"
+
+
+rule facets:
+    input:
+        terrain="<results>/terrain.nc",
+        code=stage_sources("facets"),
+    output:
+        "<results>/facets.nc",
+    log:
+        "<logs>/facets.log",
+    benchmark:
+        "<benchmarks>/facets.tsv"
+    params:
+        configuration=stage_configuration("facets"),
+    script:
+        "../scripts/stage.py"
+
+
+rule visibility:
+    input:
+        terrain="<results>/terrain.nc",
+        facets="<results>/facets.nc",
+        trajectory="<results>/trajectory.nc",
+        code=stage_sources("visibility"),
+    output:
+        "<results>/visibility.nc",
+    log:
+        "<logs>/visibility.log",
+    benchmark:
+        "<benchmarks>/visibility.tsv"
+    threads: workflow.cores
+    params:
+        configuration=stage_configuration("visibility"),
+    script:
+        "../scripts/stage.py"
+
+
+rule truth:
+    input:
+        terrain="<results>/terrain.nc",
+        trajectory="<results>/trajectory.nc",
+        code=stage_sources("truth"),
+    output:
+        "<results>/truth.nc",
+    log:
+        "<logs>/truth.log",
+    benchmark:
+        "<benchmarks>/truth.tsv"
+    threads: workflow.cores
+    params:
+        configuration=stage_configuration("truth"),
+    script:
+        "../scripts/stage.py"

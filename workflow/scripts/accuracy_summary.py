@@ -1,0 +1,12 @@
+"""Write the accuracy's statistics as JSON."""
+
+import json
+
+from job import job, read_products
+
+from vinsar import accuracy, storage
+
+with job(snakemake):
+    summary = accuracy.summary(read_products(snakemake)["accuracy"])
+    with storage.atomic(snakemake.output[0]) as path:
+        path.write_text(json.dumps(summary, indent=2) + "\n")
