@@ -8,6 +8,10 @@ min_version("9.27")
 configfile: "config/paper.yaml"
 
 
+# The software is what `run` installs from requirements.lock; this names the Python below it.
+container: "docker://python:3.11"
+
+
 include: "workflow/rules/common.smk"
 
 

@@ -1,4 +1,4 @@
-# The checked configuration, and what a rule takes of it.
+# The checked configuration, and the parts of it and of the library that rules depend on.
 import os
 
 from snakemake.exceptions import WorkflowError
@@ -7,6 +7,7 @@ from snakemake.logging import logger
 from vinsar import claims, figures, pipeline, provenance, validation
 
 SUFFIXES = ("pdf", "svg", "png")
+PANELS = [name for name in figures.FIGURES if name.startswith("fig3") and name != "fig3"]
 
 try:
     STUDY = validation.check(config)
@@ -18,13 +19,13 @@ for sentence in validation.advice(STUDY):
 
 
 def configuration(*sections):
-    """The sections of the configuration that a rule reads, so that no other reruns it."""
+    """The sections that a job reads, and no others: a change elsewhere must not rerun it."""
     values = STUDY.model_dump(mode="json", include={"study", *sections})
     return dict(sorted(values.items()))
 
 
 def sources_of(*modules):
-    """The library's files that a rule runs: Snakemake follows scripts, not what they import."""
+    """The library's files that a job runs: Snakemake follows scripts, not what they import."""
     return [os.path.relpath(path) for path in provenance.sources_of(*modules)]
 
 
@@ -38,3 +39,25 @@ def stage_sources(name):
         *sources_of(*pipeline.STAGES[name].modules),
         os.path.relpath(pipeline.__file__),
     ]
+
+
+def figure_inputs(*names):
+    products = {name for figure in names for name in figures.FIGURES[figure].inputs}
+    return {name: f"<results>/{name}.nc" for name in sorted(products)}
+
+
+def figure_configuration(*names):
+    return configuration(
+        *{part for name in names for part in figures.FIGURES[name].sections}
+    )
+
+
+def figure_files(*names, caption):
+    """The files of figures; the report shows the PNG."""
+    shown = dict(caption=caption, category="Figures")
+    files = []
+    for name in names:
+        stem = f"<results>/figures/{name}"
+        png = report(f"{stem}.png", labels={"figure": name}, **shown)
+        files += [f"{stem}.pdf", f"{stem}.svg", png]
+    return files

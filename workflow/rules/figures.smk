@@ -1,29 +1,4 @@
 # The paper's figures, each as PDF, SVG and PNG.
-PANELS = [
-    name for name in figures.FIGURES if name.startswith("fig3") and name != "fig3"
-]
-
-
-def figure_inputs(*names):
-    products = {name for figure in names for name in figures.FIGURES[figure].inputs}
-    return {name: f"<results>/{name}.nc" for name in sorted(products)}
-
-
-def figure_configuration(*names):
-    return configuration(
-        *{part for name in names for part in figures.FIGURES[name].sections}
-    )
-
-
-def figure_files(*names, caption):
-    """The files of figures; the report shows the PNG."""
-    shown = dict(caption=caption, category="Figures")
-    files = []
-    for name in names:
-        stem = f"<results>/figures/{name}"
-        png = report(f"{stem}.png", labels={"figure": name}, **shown)
-        files += [f"{stem}.pdf", f"{stem}.svg", png]
-    return files
 
 
 rule fig1:
