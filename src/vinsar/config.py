@@ -224,6 +224,9 @@ class Study(Section):
     accuracy: Accuracy
     registration: Registration
     figures: Figures
+    variants: dict[str, dict[str, Any]] = _key(
+        "overrides by name; `./run variants` tabulates the accuracy of each", "ours"
+    )
 
     @classmethod
     def part(cls, values: Mapping[str, Any]) -> Study:

@@ -93,16 +93,17 @@ def load(*paths: str | Path) -> config.Study:
             raise ValueError(f"cannot read the configuration {path}: {error}") from error
         if not isinstance(content, dict):
             raise ValueError(f"{path} holds {type(content).__name__}; keys with values are needed")
-        merged = _merge(merged, content)
+        merged = merge(merged, content)
     return check(merged)
 
 
-def _merge(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any]:
+def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a configuration with some keys changed, section by section; lists are replaced."""
     result = dict(base)
-    for key, value in override.items():
+    for key, value in changes.items():
         old = result.get(key)
         deeper = isinstance(value, dict) and isinstance(old, dict)
-        result[key] = _merge(old or {}, value) if deeper else value
+        result[key] = merge(old or {}, value) if deeper else value
     return result
 
 
@@ -148,6 +149,42 @@ def check(raw: Mapping[str, Any]) -> config.Study:
     if faults:
         raise ConfigurationError(faults)
     return study
+
+
+def variants(study: config.Study) -> dict[str, config.Study]:
+    """Return a study's variants, all checked.
+
+    They are checked when they are asked for: a small study inherits the paper's variants, not all
+    of which suit it.
+
+    Parameters
+    ----------
+    study
+        The study.
+
+    Returns
+    -------
+    dict of config.Study
+        Each variant by its name, without variants of its own.
+
+    Raises
+    ------
+    ConfigurationError
+        If anything is wrong with one of them; the faults' keys begin with its name.
+    """
+    base = study.model_dump(mode="json")
+    found, faults = {}, []
+    for name, changes in study.variants.items():
+        try:
+            found[name] = check(merge(base, changes) | {"variants": {}})
+        except ConfigurationError as error:
+            faults += [
+                Fault(f"variants.{name}: {fault.key}", fault.value, fault.allowed)
+                for fault in error.faults
+            ]
+    if faults:
+        raise ConfigurationError(faults)
+    return found
 
 
 def advice(study: config.Study) -> list[str]:

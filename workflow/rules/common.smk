@@ -7,7 +7,9 @@ from snakemake.logging import logger
 from vinsar import claims, figures, pipeline, provenance, validation
 
 SUFFIXES = ("pdf", "svg", "png")
-PANELS = [name for name in figures.FIGURES if name.startswith("fig3") and name != "fig3"]
+PANELS = [
+    name for name in figures.FIGURES if name.startswith("fig3") and name != "fig3"
+]
 
 try:
     STUDY = validation.check(config)
@@ -24,9 +26,10 @@ def configuration(*sections):
     return dict(sorted(values.items()))
 
 
-def sources_of(*modules):
-    """The library's files that a job runs: Snakemake follows scripts, not what they import."""
-    return [os.path.relpath(path) for path in provenance.sources_of(*modules)]
+def sources_of(*modules, script):
+    """The files that a job runs: its script and, what Snakemake does not follow, the library."""
+    library = [os.path.relpath(path) for path in provenance.sources_of(*modules)]
+    return [*library, f"workflow/scripts/{script}.py", "workflow/scripts/job.py"]
 
 
 def stage_configuration(name):
@@ -36,7 +39,7 @@ def stage_configuration(name):
 def stage_sources(name):
     # The pipeline binds the configuration to the stage; what else it imports is not run.
     return [
-        *sources_of(*pipeline.STAGES[name].modules),
+        *sources_of(*pipeline.STAGES[name].modules, script="stage"),
         os.path.relpath(pipeline.__file__),
     ]
 

@@ -4,7 +4,7 @@
 rule fig1:
     input:
         **figure_inputs("fig1"),
-        code=sources_of("figures"),
+        code=sources_of("figures", script="figures"),
     output:
         figure_files("fig1", caption="../report/fig1.rst"),
     log:
@@ -20,7 +20,7 @@ rule fig1:
 rule fig2:
     input:
         **figure_inputs("fig2"),
-        code=sources_of("figures"),
+        code=sources_of("figures", script="figures"),
     output:
         figure_files("fig2", caption="../report/fig2.rst"),
     log:
@@ -36,7 +36,7 @@ rule fig2:
 rule fig3:
     input:
         **figure_inputs("fig3"),
-        code=sources_of("figures"),
+        code=sources_of("figures", script="figures"),
     output:
         figure_files("fig3", caption="../report/fig3.rst"),
     log:
@@ -52,7 +52,7 @@ rule fig3:
 rule fig3_panels:
     input:
         **figure_inputs(*PANELS),
-        code=sources_of("figures"),
+        code=sources_of("figures", script="figures"),
     output:
         figure_files(*PANELS, caption="../report/fig3_panels.rst"),
     log:
@@ -68,7 +68,7 @@ rule fig3_panels:
 rule fig4:
     input:
         **figure_inputs("fig4"),
-        code=sources_of("figures"),
+        code=sources_of("figures", script="figures"),
     output:
         figure_files("fig4", caption="../report/fig4.rst"),
     log:

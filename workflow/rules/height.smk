@@ -38,7 +38,7 @@ rule accuracy:
 rule accuracy_summary:
     input:
         accuracy="<results>/accuracy.nc",
-        code=sources_of("accuracy"),
+        code=sources_of("accuracy", script="accuracy_summary"),
     output:
         report(
             "<results>/accuracy.json",

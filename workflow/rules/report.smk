@@ -4,7 +4,7 @@
 rule claims:
     input:
         **{name: f"<results>/{name}.nc" for name in claims.INPUTS},
-        code=sources_of("claims"),
+        code=sources_of("claims", script="claims"),
     output:
         json=report(
             "<results>/claims.json",
@@ -20,3 +20,23 @@ rule claims:
         configuration=configuration(*claims.SECTIONS),
     script:
         "../scripts/claims.py"
+
+
+rule variants:
+    input:
+        code=sources_of("variants", script="variants"),
+    output:
+        report(
+            "<results>/variants.md",
+            caption="../report/variants.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/variants.log",
+    benchmark:
+        "<benchmarks>/variants.tsv"
+    threads: workflow.cores
+    params:
+        configuration=STUDY.model_dump(mode="json"),
+    script:
+        "../scripts/variants.py"

@@ -29,6 +29,10 @@ _DIMENSION = {
 }
 
 
+_LEAST_ANGLE_DEG = 25
+_EDGES = ("x_min_m", "x_max_m", "y_min_m", "y_max_m")
+
+
 @dataclass(frozen=True)
 class Layout:
     """The antennas and a target in the plane x = 0, and what follows from them.
@@ -101,11 +105,11 @@ def draw(products: Products, study: config.Study) -> Figure:
     """
     del products
     scheme = layout(study)
-    left, width, below = 11.0, 166.0, 76.0
+    left, width, below = 11.0, 166.0, 78.0
     view = _side_limits(scheme, study)
     height = width * (view[3] - view[2]) / (view[1] - view[0])
-    figure = style.new_figure(style.TWO_COLUMNS_MM, below + 26 + height)
-    side = style.place(figure, left, below + 20, width, height)
+    figure = style.new_figure(style.TWO_COLUMNS_MM, below + 19 + height)
+    side = style.place(figure, left, below + 13, width, height)
     _side(side, scheme, study, view)
     _near_antennas(style.place(figure, 13, 10, 66, 66), scheme)
     _values(style.place(figure, 85, 10, 44, 66), study)
@@ -114,11 +118,12 @@ def draw(products: Products, study: config.Study) -> Figure:
 
 
 def _side_limits(scheme: Layout, study: config.Study) -> tuple[float, float, float, float]:
-    far = max(study.scene.y_max_m, study.imaging.y_max_m)
-    near = min(-1.5 * scheme.lower[1], scheme.upper[1] - scheme.baseline)
-    top = max(scheme.lower[1], scheme.upper[1], scheme.target[1])
-    span = 1.05 * (far - near)
-    return (near, near + span, -0.02 * span, max(top + 0.035 * span, 0.12 * span))
+    far = 1.02 * max(study.scene.y_max_m, study.imaging.y_max_m)
+    near = min(-1.5 * scheme.lower[1], -0.12 * far, _zoom_limits(scheme)[0])
+    # What is written beside the target takes a seventh of the width at its right.
+    span = max(far - near, 7 / 6 * (scheme.target[0] - near))
+    top = max(1.08 * scheme.target[1], _zoom_limits(scheme)[3])
+    return (near, near + span, -0.02 * span, max(top + 0.03 * span, 0.12 * span))
 
 
 def _side(
@@ -170,16 +175,14 @@ def _side(
         -unit, 0.42 * lower[1], f"$H_0$ = {lower[1]:g} m", ha="right", va="center", fontsize=7
     )
     radius = 0.5 * lower[1]
-    look = np.degrees(scheme.look)
-    axes.add_patch(
-        Arc(tuple(lower), 2 * radius, 2 * radius, theta1=-90, theta2=look - 90, linewidth=0.6)
-    )
-    axes.text(
-        *(lower + (radius + unit) * np.array([np.sin(scheme.look / 2), -np.cos(scheme.look / 2)])),
-        r"$\theta$",
-        ha="left",
-        va="top",
-    )
+    if radius > 7 * unit:
+        diameter, look = 2 * radius, np.degrees(scheme.look)
+        axes.add_patch(
+            Arc(tuple(lower), diameter, diameter, theta1=-90, theta2=look - 90, linewidth=0.6)
+        )
+        middle = scheme.look / 3
+        at = lower + 0.62 * radius * np.array([np.sin(middle), -np.cos(middle)])
+        axes.text(at[0], at[1], r"$\theta$", ha="center", va="center")
     axes.plot([target[0], target[0]], [0, target[1]], color=style.INK, linewidth=0.8)
     axes.annotate(f"T, $h$ = {target[1]:g} m", tuple(target), (5, 2), textcoords="offset points")
     zoom = _zoom_limits(scheme)
@@ -194,11 +197,11 @@ def _side(
             linestyle=":",
         )
     )
-    axes.annotate(
-        "(b)", (zoom[1], zoom[3]), (2, 0), textcoords="offset points", va="top", fontsize=6.5
-    )
+    axes.annotate("(b)", (zoom[0], zoom[3]), (0, 1), textcoords="offset points", fontsize=6.5)
     axes.set_xlabel("y, ahead (m)")
     axes.set_ylabel("z (m)")
+    axes.xaxis.set_major_locator(style.round_ticks(11))
+    axes.yaxis.set_major_locator(style.round_ticks(4))
     axes.set_title("(a) side view in the plane x = 0, to scale (vehicle schematic)")
 
 
@@ -239,7 +242,7 @@ def _near_antennas(axes: Axes, scheme: Layout) -> None:
     axes.set_aspect("equal")
     lower, upper, size = scheme.lower, scheme.upper, scheme.baseline
     beta, look = np.degrees(scheme.beta), np.degrees(scheme.look)
-    dashed = {"color": style.GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
+    dashed: dict[str, Any] = {"color": style.GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
     axes.plot([lower[0], view[1]], [lower[1], lower[1]], **dashed)
     axes.plot([lower[0], lower[0]], [lower[1], view[2]], **dashed)
     axes.plot(*zip(lower, upper, strict=True), color=style.INK, linewidth=1.6, zorder=4)
@@ -261,26 +264,33 @@ def _near_antennas(axes: Axes, scheme: Layout) -> None:
             ha="center",
             va="bottom" if side > 0 else "top",
         )
-    for antenna, name in ((lower, "$S_1$"), (upper, "$S_2$")):
+    for antenna, name, offset in ((lower, "$S_1$", (-6, -3)), (upper, "$S_2$", (0, 5))):
         axes.annotate(
-            name, tuple(antenna), (-5, 0), textcoords="offset points", ha="right", va="center"
+            name,
+            tuple(antenna),
+            offset,
+            textcoords="offset points",
+            ha="right" if offset[0] else "center",
         )
+    # Too narrow an angle has no room for an arc and its value.
+    narrow = min(beta, 180 - beta) < _LEAST_ANGLE_DEG
     normal = np.array([-np.sin(scheme.beta), np.cos(scheme.beta)])
     axes.annotate(
-        f"$B$ = {size:g} m",
+        f"$B$ = {size:g} m" + (rf", $\beta$ = {beta:g}°" if narrow else ""),
         tuple((lower + upper) / 2),
         tuple(6 * normal),
         textcoords="offset points",
         ha="right" if normal[0] < -0.3 else "center",
         va="center" if normal[0] < -0.3 else "bottom",
     )
-    for radius, start, stop, text in (
-        (0.42, 0.0, beta, f"$\beta$ = {beta:g}°"),
-        (0.30, -90.0, look - 90, f"$\theta$ = {look:.2f}°"),
-    ):
+    arcs = [(0.30, -90.0, look - 90, rf"$\theta$ = {look:.2f}°")]
+    if not narrow:
+        arcs.append((0.42, 0.0, beta, rf"$\beta$ = {beta:g}°"))
+    for radius, start, stop, text in arcs:
         span = 2 * radius * size
         axes.add_patch(Arc(tuple(lower), span, span, theta1=start, theta2=stop, linewidth=0.8))
-        middle = np.deg2rad((start + stop) / 2)
+        # Beside the arc, to the right even where the angle is obtuse.
+        middle = np.deg2rad(start + min(stop - start, 90) / 2)
         axes.annotate(
             text,
             tuple(lower + radius * size * np.array([np.cos(middle), np.sin(middle)])),
@@ -290,6 +300,8 @@ def _near_antennas(axes: Axes, scheme: Layout) -> None:
         )
     axes.set_xlabel("y, ahead (m)")
     axes.set_ylabel("z (m)")
+    axes.xaxis.set_major_locator(style.round_ticks(7))
+    axes.yaxis.set_major_locator(style.round_ticks(7))
     axes.set_title("(b) the antennas, to scale")
 
 
@@ -326,15 +338,15 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         ("positions", f"{positions}"),
         ("rail height $H_0$", f"{options.rail_height_m:g} m"),
         ("baseline $B$", f"{scheme.baseline:g} m"),
-        (r"its attitude $\beta$", f"{options.baseline_angle_deg:g}°"),
+        (r"baseline angle $\beta$", f"{options.baseline_angle_deg:g}°"),
         ("", ""),
         (r"look angle $\theta$", f"{np.degrees(scheme.look):.2f}°"),
         (r"$\Delta r = r_1 - r_2$", _signed(1000 * (r1 - r2), ".1f", "mm")),
-        (r"$B_\parallel$", _signed(1000 * float(along), ".1f", "mm")),
-        (r"$B_\perp$", _signed(1000 * float(across), ".1f", "mm")),
+        ("$B_∥$", _signed(1000 * float(along), ".1f", "mm")),
+        ("$B_⊥$", _signed(1000 * float(across), ".1f", "mm")),
         ("height of ambiguity", _signed(float(ambiguity), ".3f", "m")),
-        ("resolution, range", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
-        ("resolution, x", f"{100 * float(azimuth):.1f} cm"),
+        ("slant-range resolution", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
+        ("resolution in x", f"{100 * float(azimuth):.1f} cm"),
     ]
 
 
@@ -353,7 +365,7 @@ def _values(axes: Axes, study: config.Study) -> None:
             axes.text(0, row, name, va="center")
             axes.text(1, row, value, va="center", ha="right")
         else:
-            axes.text(0, row + 0.1, "At the target T", va="center", fontsize=8)
+            axes.text(0, row + 0.2, "At the target T", va="center", fontsize=8)
 
 
 def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None:
@@ -364,7 +376,7 @@ def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None
     rail = study.radar.rail_height_m
     # The vehicle's hood in the plan, of the proportions of the side view.
     body = (-0.45 * rail, -1.4 * rail, 0.9 * rail, 2.16 * rail)
-    near, far = -1.5 * rail, 1.04 * max(scene.y_max_m, image.y_max_m)
+    near, far = -1.5 * rail, 1.1 * max(scene.y_max_m, image.y_max_m)
     half = max(abs(edge) for area in (scene, image) for edge in (area.x_min_m, area.x_max_m))
     half = 1.1 * max(half, body[2] / 2, study.radar.aperture_length_m / 2)
     half = max(half, (far - near) / shape / 2)
@@ -376,6 +388,15 @@ def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None
         Rectangle(body[:2], *body[2:], facecolor=_VEHICLE, edgecolor=style.GREY, linewidth=0.6)
     )
     axes.add_patch(_area(scene, facecolor=_SCENE, edgecolor="none"))
+    same = all(getattr(scene, edge) == getattr(image, edge) for edge in _EDGES)
+    axes.annotate(
+        "scene and image" if same else "scene, image outlined",
+        (0, max(scene.y_max_m, image.y_max_m)),
+        (0, 3),
+        textcoords="offset points",
+        ha="center",
+        fontsize=6.5,
+    )
     axes.add_patch(_area(image, fill=False, edgecolor=style.INK, linewidth=0.7))
     end = study.radar.aperture_length_m / 2
     for x in (-end, end):
@@ -383,7 +404,9 @@ def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None
     axes.plot([-end, end], [0, 0], color=style.BLUE, linewidth=2.2, solid_capstyle="butt")
     axes.plot(0, scheme.target[0], "^", color=style.INK, markersize=5, zorder=5)
     axes.annotate("T", (0, scheme.target[0]), (4, 0), textcoords="offset points", va="center")
-    axes.annotate("$L$", (end, 0), (3, 0), textcoords="offset points", va="center")
+    axes.annotate("$L$", (body[2] / 2, 0), (2, 0), textcoords="offset points", va="center")
+    axes.xaxis.set_major_locator(style.round_ticks(4))
+    axes.yaxis.set_major_locator(style.round_ticks(9))
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y, ahead (m)")
     axes.set_title("(c) plan, to scale")

@@ -1,4 +1,4 @@
-"""Fig. 3: the chain from the scene to the reconstructed height, as one sheet and as single panels."""
+"""Fig. 3: the chain from scene to reconstructed height, as one sheet and as single panels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from vinsar.figures import maps, style
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     import xarray as xr
     from matplotlib.colors import Colormap
@@ -24,6 +24,8 @@ _HEIGHT_STEP_M = 0.05
 # Facets along the longer side of the surface; more are too small to tell apart on paper.
 _SURFACE_CELLS = 90
 _SURFACE_HEIGHT_SHARE = 0.4
+_LEAST_SURFACE_MM = 34.0
+_TITLE_MM = 7.0
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,7 @@ class Layer:
     limits: tuple[float, float]
     label: str
     extend: maps.Extend = "neither"
-    ticks: Sequence[float] | None = None
-    tick_labels: Sequence[str] | None = None
+    phase: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,15 +70,6 @@ def height_limits(truth: xr.Dataset) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def pi_label(halves: int) -> str:
-    """Return how a phase of so many halves of pi is written."""
-    sign = "−" if halves < 0 else ""
-    whole, odd = divmod(abs(halves), 2)
-    if odd:
-        return f"{sign}{'' if abs(halves) == 1 else abs(halves)}π/2"
-    return "0" if whole == 0 else f"{sign}{'' if whole == 1 else whole}π"
-
-
 def _height(data: xr.DataArray, products: Products, study: config.Study) -> Layer:
     limits = height_limits(products["truth"])
     return Layer(
@@ -105,10 +97,11 @@ def _reflectivity(products: Products, study: config.Study) -> Layer:
 
 
 def _amplitude(channel: str, products: Products, study: config.Study) -> Layer:
-    amplitude = np.abs(products["images"]["image"])
+    amplitude = abs(products["images"]["image"])
     # One reference for both channels, so that their grey levels compare.
     top = max(float(amplitude.max()), np.finfo(np.float32).tiny)
-    data = 20 * np.log10(np.maximum(amplitude.sel(channel=channel) / top, 1e-20))
+    amplitude = amplitude.sel(channel=channel)
+    data = amplitude.copy(data=20 * np.log10(np.maximum(amplitude.values / top, 1e-20)))
     limits = (-study.figures.amplitude_range_db, 0.0)
     return Layer(
         data, style.colormap("gray"), limits, "amplitude (dB)", maps.beyond(data.values, limits)
@@ -122,21 +115,18 @@ def _wrapped_phase(product: str, products: Products, study: config.Study) -> Lay
         style.colormap(study.figures.phase_colormap, "figures.phase_colormap"),
         (-np.pi, np.pi),
         "phase (rad)",
-        ticks=(-np.pi, 0.0, np.pi),
-        tick_labels=("−π", "0", "π"),
+        phase=True,
     )
 
 
 def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
     del study
     data = products["unwrapped"]["phase"]
+    known = data.values[np.isfinite(data.values)]
     # A few failed cells must not flatten the colours of all others.
-    low, high = np.nanpercentile(data.values, [0.1, 99.9]) / (np.pi / 2)
+    low, high = np.percentile(known, [0.1, 99.9]) / (np.pi / 2) if known.size else (-2.0, 2.0)
     first, last = int(np.floor(low)), int(np.ceil(high))
-    last = max(last, first + 1)
-    limits = (first * np.pi / 2, last * np.pi / 2)
-    step = next(step for step in (1, 2, 4, 10, 20, 40, 100, 200, 10**6) if last - first <= 7 * step)
-    halves = [n for n in range(first, last + 1) if n % step == 0]
+    limits = (first * np.pi / 2, max(last, first + 1) * np.pi / 2)
     return Layer(
         data,
         # The phase falls as the height rises (Eq. 1): reversed, high ground looks bright.
@@ -144,8 +134,7 @@ def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
         limits,
         "phase (rad)",
         maps.beyond(data.values, limits),
-        [n * np.pi / 2 for n in halves],
-        [pi_label(n) for n in halves],
+        phase=True,
     )
 
 
@@ -188,17 +177,18 @@ def draw_sheet(products: Products, study: config.Study) -> Figure:
     matplotlib.figure.Figure
         The figure.
     """
-    truth = products["truth"]
-    left, bottom, pitch = 10.5, 15.0, 57.0
-    width, height = maps.fit(truth["height"], 39.5, 60)
-    row_pitch = height + 7
-    figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + 3 * row_pitch)
+    left, bottom, pitch, width = 12.5, 15.0, 56.0, 38.0
+    _, height = maps.fit(products["truth"]["height"], width, 60)
+    # Rows from the top; only the first has the surface, which needs some height.
+    heights = (max(height, _LEAST_SURFACE_MM), height, height)
+    bottoms = [bottom + sum(heights[row + 1 :]) + _TITLE_MM * (2 - row) for row in range(3)]
+    figure = style.new_figure(style.TWO_COLUMNS_MM, bottoms[0] + heights[0] + _TITLE_MM)
     # The surface takes the first of nine places, then the eight maps follow by row.
-    _surface(figure, (1, bottom + 2 * row_pitch, 52, height), products, study, "(a) ")
+    _surface(figure, (2, bottoms[0], 50, heights[0]), products, study, "(a) ")
     shaded = False
     for place, letter in enumerate(PANELS, start=1):
         row, column = divmod(place, 3)
-        box = (left + column * pitch, bottom + (2 - row) * row_pitch, width, height)
+        box = (left + column * pitch, bottoms[row], width, heights[row])
         shaded |= _map(
             figure,
             box,
@@ -238,15 +228,19 @@ def draw_single(letter: str, products: Products, study: config.Study) -> Figure:
     matplotlib.figure.Figure
         The figure.
     """
-    left, bottom = 11.0, 14.0
-    width, height = maps.fit(products["truth"]["height"], 60, 75)
+    left, bottom, width = 13.0, 14.0, 57.0
+    _, height = maps.fit(products["truth"]["height"], width, 75)
     surface = 52.0 if letter == "a" else 0.0
-    figure = style.new_figure(style.ONE_COLUMN_MM, bottom + height + 7 + surface)
+    figure = style.new_figure(style.ONE_COLUMN_MM, bottom + height + _TITLE_MM + surface)
     if surface:
-        _surface(figure, (4, bottom + height + 8, 80, surface - 6), products, study, "")
-    left += (60 - width) / 2
-    box = (left, bottom, width, height)
-    if _map(figure, box, letter, products, study):
+        _surface(
+            figure,
+            (left, bottom + height + _TITLE_MM, 66, surface - _TITLE_MM),
+            products,
+            study,
+            "",
+        )
+    if _map(figure, (left, bottom, width, height), letter, products, study):
         maps.explain_shadow(figure, left, 1.5, maps.SHADOW_LABEL)
     return figure
 
@@ -265,7 +259,8 @@ def _map(
     """Draw a panel's map in a box (left, bottom, width, height), mm; say if it has shadow."""
     panel = PANELS[letter]
     layer = panel.layer(products, study)
-    axes = style.place(figure, *box)
+    title = f"{prefix}{panel.title}{' (map)' if letter == 'a' else ''}"
+    axes = maps.place(figure, layer.data, box, title)
     image = maps.draw(
         axes,
         layer.data,
@@ -274,15 +269,7 @@ def _map(
         label_x=label_x,
         label_y=label_y,
     )
-    axes.set_title(f"{prefix}{panel.title}{', map' if letter == 'a' else ''}")
-    maps.colorbar(
-        axes,
-        image,
-        layer.label,
-        extend=layer.extend,
-        ticks=layer.ticks,
-        tick_labels=layer.tick_labels,
-    )
+    maps.colorbar(axes, image, layer.label, extend=layer.extend, phase=layer.phase)
     return maps.outline_shadow(axes, products["truth"]["shadow"])
 
 
@@ -295,15 +282,14 @@ def _surface(
 ) -> None:
     """Draw the true terrain as a surface, seen from the vehicle's side of the scene."""
     from matplotlib.colors import LightSource, Normalize
-    from matplotlib.ticker import MaxNLocator
 
     height = products["terrain"]["height"]
     step = max(1, -(-max(height.shape) // _SURFACE_CELLS))
     height = height[::step, ::step]
     limits = height_limits(products["truth"])
     extent = {axis: float(height[axis][-1] - height[axis][0]) for axis in ("x", "y")}
-    longest = max(extent.values())
-    exaggeration = max(1, round(_SURFACE_HEIGHT_SHARE * longest / (limits[1] - limits[0])))
+    side = np.sqrt(extent["x"] * extent["y"])
+    exaggeration = max(1, round(_SURFACE_HEIGHT_SHARE * side / (limits[1] - limits[0])))
 
     axes: Any = style.place(figure, *box, projection="3d", computed_zorder=False)
     colours = style.colormap(study.figures.height_colormap, "figures.height_colormap")
@@ -330,23 +316,18 @@ def _surface(
     )
     surface.set_rasterized(True)
     axes.set_box_aspect(
-        (extent["x"], extent["y"], exaggeration * (limits[1] - limits[0])), zoom=1.15
+        (extent["x"], extent["y"], exaggeration * (limits[1] - limits[0])), zoom=1.02
     )
     axes.set_zlim(*limits)
-    axes.view_init(elev=32, azim=-62)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+    axes.view_init(elev=38, azim=-62)
+    shares = (extent["x"] / max(extent.values()), extent["y"] / max(extent.values()), 0.6)
+    for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), shares, strict=True):
         axis.set_pane_color("white")
         axis.line.set_linewidth(0.6)
-        axis.set_major_locator(MaxNLocator(3 if axis is axes.zaxis else 5, steps=[1, 2, 5, 10]))
-        axis.labelpad = -7
+        axis.set_major_locator(style.round_ticks(round(4 * share)))
+        axis.labelpad = -6
     axes.tick_params(pad=-3)
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
-    axes.set_zlabel("z (m)")
-    width, height_mm = (float(size) * style.MM_PER_INCH for size in figure.get_size_inches())
-    figure.text(
-        (box[0] + 2) / width,
-        (box[1] + box[3] + 1) / height_mm,
-        f"{prefix}true height, z × {exaggeration}",
-        fontsize=8,
-    )
+    title = f"{prefix}true height (m), vertical × {exaggeration}"
+    style.write_title(figure, box[0], box[1] + box[3], title)

@@ -44,33 +44,36 @@ def draw(products: Products, study: config.Study) -> Figure:
     error = accuracy["height_error"]
     tolerance = float(accuracy["tolerance"])
     limit = 3 * tolerance
-    width, height = maps.fit(error, 62, 90)
-    figure = style.new_figure(style.TWO_COLUMNS_MM, height + 20)
+    left, bottom, width = 13.0, 13.0, 60.0
+    _, height = maps.fit(error, width, 90)
+    height = max(height, 66.0)
+    figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + height + 7)
 
-    axes = style.place(figure, 11, 13, width, height)
+    title = "(a) height error, reconstructed minus true"
+    axes = maps.place(figure, error, (left, bottom, width, height), title)
     image = maps.draw(
         axes,
         error * 100,
         colormap=style.colormap("cmc.vik"),
         limits=(-limit * 100, limit * 100),
     )
-    axes.set_title("(a) height error, reconstructed minus true")
     maps.colorbar(
         axes,
         image,
         "height error (cm)",
         extend=maps.beyond(error.values, (-limit, limit)),
-        ticks=[step * tolerance * 100 for step in range(-3, 4)],
     )
     if maps.outline_shadow(axes, accuracy["shadow"]):
-        maps.explain_shadow(figure, 11, 1.5, maps.SHADOW_LABEL)
+        below = bottom + height - style.size_mm(axes)[1] - 11.5
+        maps.explain_shadow(figure, left, below, maps.SHADOW_LABEL)
 
-    left = 11 + width + 29
-    room = style.TWO_COLUMNS_MM - left - 3
-    histogram = style.place(figure, left, 13, room, height - 27)
-    _histogram(histogram, accuracy, tolerance)
-    table = style.place(figure, left - 8, 13 + height - 22, room + 8, 22)
-    _table(table, accuracy)
+    left, room = 102.0, 73.0
+    _histogram(style.place(figure, left, bottom, room, height - 31), accuracy, tolerance)
+    left, room = left - 11, room + 11
+    style.write_title(
+        figure, left, bottom + height, "(b) statistics and histogram of the height error"
+    )
+    _table(style.place(figure, left, bottom + height - 22, room, 22), accuracy)
     return figure
 
 
@@ -92,7 +95,7 @@ def bin_edges(error: NDArray[np.float64], tolerance: float) -> NDArray[np.float6
     worst = float(np.nanmax(np.abs(error), initial=0))
     reach = min(max(np.ceil(worst / tolerance), 2), _HISTOGRAM_TOLERANCES)
     steps = int(reach) * _BINS_PER_TOLERANCE
-    return np.arange(-steps, steps + 1) * (tolerance / _BINS_PER_TOLERANCE)
+    return np.linspace(-steps, steps, 2 * steps + 1) * (tolerance / _BINS_PER_TOLERANCE)
 
 
 def _histogram(axes: Axes, accuracy: xr.Dataset, tolerance: float) -> None:
@@ -114,13 +117,13 @@ def _histogram(axes: Axes, accuracy: xr.Dataset, tolerance: float) -> None:
                 count, edges * 100, color=colour, fill=True, alpha=0.2, linewidth=0, baseline=0.5
             )
     axes.set_yscale("log")
-    axes.set_ylim(0.5, most * 8)
+    axes.set_ylim(0.5, most * 4)
     axes.set_xlim(edges[0] * 100, edges[-1] * 100)
     for side in (-1, 1):
         axes.axvline(side * tolerance * 100, color=style.INK, linewidth=0.7, linestyle="--")
     axes.annotate(
         f"± {tolerance * 100:g} cm",
-        (tolerance * 100, most * 5),
+        (tolerance * 100, most * 2.4),
         (3, 0),
         textcoords="offset points",
         va="center",
@@ -137,7 +140,10 @@ def _histogram(axes: Axes, accuracy: xr.Dataset, tolerance: float) -> None:
         )
     axes.set_xlabel("height error (cm)")
     axes.set_ylabel(f"cells per {tolerance / _BINS_PER_TOLERANCE * 1000:g} mm")
-    axes.legend(loc="upper left", borderaxespad=0.3)
+    axes.xaxis.set_major_locator(style.round_ticks(9))
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3, borderaxespad=0.2, columnspacing=1.4
+    )
 
 
 def table_rows(accuracy: xr.Dataset) -> list[list[str]]:
@@ -155,8 +161,8 @@ def table_rows(accuracy: xr.Dataset) -> list[list[str]]:
     """
     tolerance = float(accuracy["tolerance"]) * 100
     rows = [
-        ["", "cells", "median", "std", "95th |e|", "max |e|", f"≤ {tolerance:g} cm", "found"],
-        ["", "", "cm", "cm", "cm", "cm", "%", "%"],
+        ["", "cells", "median", "std", "95th", "max", f"≤ {tolerance:g} cm", "found"],
+        ["", "", "cm", "cm", "|e|, cm", "|e|, cm", "%", "%"],
     ]
     for region, name in _REGIONS.items():
         part = accuracy.sel(region=region)
@@ -173,17 +179,19 @@ def table_rows(accuracy: xr.Dataset) -> list[list[str]]:
 
 
 def _written(value: float, form: str) -> str:
-    return f"{value:{form}}".replace("-", "−") if np.isfinite(value) else "–"
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:{form}}"
+    return text.replace("-", "" if float(text) == 0 else "−")
 
 
 def _table(axes: Axes, accuracy: xr.Dataset) -> None:
     axes.set_axis_off()
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
-    axes.set_title("(b) statistics and histogram of the height error")
-    right = (0.0, 0.33, 0.445, 0.535, 0.665, 0.78, 0.90, 1.0)
+    right = (0.0, 0.315, 0.44, 0.535, 0.655, 0.775, 0.90, 1.0)
     for row, level in zip(table_rows(accuracy), (0.86, 0.72, 0.50, 0.30, 0.10), strict=True):
         for column, (text, at) in enumerate(zip(row, right, strict=True)):
             axes.text(at, level, text, ha="right" if column else "left", va="center", fontsize=6.8)
     for level in (0.98, 0.62, 0.0):
-        axes.plot([0, 1], [level, level], color=style.INK, linewidth=0.5)
+        axes.plot([0, 1], [level, level], color=style.INK, linewidth=0.5, clip_on=False)

@@ -9,8 +9,6 @@ import numpy as np
 from vinsar.figures import style
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
@@ -26,6 +24,7 @@ SHADOW_LABEL = "outline of the shadow"
 COLORBAR_GAP_MM, COLORBAR_MM = 1.5, 2.5
 
 _SHADOW_SMOOTHING_M = 0.15
+_TICK_MM = 6.0
 
 
 def edges(data: xr.DataArray) -> tuple[float, float, float, float]:
@@ -45,6 +44,35 @@ def fit(data: xr.DataArray, width_mm: float, height_mm: float) -> tuple[float, f
     left, right, near, far = edges(data)
     scale = min(width_mm / (right - left), height_mm / (far - near))
     return (right - left) * scale, (far - near) * scale
+
+
+def place(
+    figure: Figure, data: xr.DataArray, box: tuple[float, float, float, float], title: str
+) -> Axes:
+    """Add axes for a map as large as fits in a box, at its top and in the middle of its width.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    data
+        The raster.
+    box
+        Left, bottom, width and height, mm.
+    title
+        Written above the left end of the box.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes.
+    """
+    left, bottom, box_width, box_height = box
+    width, height = fit(data, box_width, box_height)
+    style.write_title(figure, left, bottom + box_height, title)
+    return style.place(
+        figure, left + (box_width - width) / 2, bottom + box_height - height, width, height
+    )
 
 
 def draw(
@@ -76,8 +104,6 @@ def draw(
     matplotlib.image.AxesImage
         The picture, for its colour bar.
     """
-    from matplotlib.ticker import MaxNLocator
-
     image = axes.imshow(
         data.values,
         extent=edges(data),
@@ -86,8 +112,9 @@ def draw(
         vmax=limits[1],
         aspect="equal",
     )
-    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
+    width, height = style.size_mm(axes)
+    axes.xaxis.set_major_locator(style.round_ticks(min(6, int(width / 6))))
+    axes.yaxis.set_major_locator(style.round_ticks(min(7, int(height / 5))))
     axes.tick_params(labelbottom=label_x, labelleft=label_y)
     if label_x:
         axes.set_xlabel("x (m)")
@@ -102,8 +129,7 @@ def colorbar(
     label: str,
     *,
     extend: Extend = "neither",
-    ticks: Sequence[float] | None = None,
-    tick_labels: Sequence[str] | None = None,
+    phase: bool = False,
 ) -> Any:
     """Draw a colour bar of the axes' height at their right.
 
@@ -117,34 +143,73 @@ def colorbar(
         Quantity and unit.
     extend
         Ends at which values lie beyond the colours.
-    ticks, tick_labels
-        Where to mark the bar, and with what.
+    phase
+        Whether to mark multiples of pi rather than round numbers.
 
     Returns
     -------
     matplotlib.colorbar.Colorbar
         The bar.
     """
-    figure: Figure = axes.get_figure(root=True)  # type: ignore[assignment]
-    width, height = (float(size) * style.MM_PER_INCH for size in figure.get_size_inches())
+    figure: Any = axes.get_figure(root=True)
+    page_width, page_height = style.page_mm(figure)
     box = axes.get_position()
     bar = style.place(
         figure,
-        box.x1 * width + COLORBAR_GAP_MM,
-        box.y0 * height,
+        box.x1 * page_width + COLORBAR_GAP_MM,
+        box.y0 * page_height,
         COLORBAR_MM,
-        box.height * height,
+        box.height * page_height,
     )
     result = figure.colorbar(mappable, cax=bar, extend=extend, extendfrac=0.04, label=label)
-    result.outline.set_linewidth(0.5)  # type: ignore[operator]
-    if ticks is not None:
-        result.set_ticks(list(ticks), labels=tick_labels)
+    result.outline.set_linewidth(0.5)
+    most = max(2, int(box.height * page_height / _TICK_MM))
+    if phase:
+        halves = pi_ticks(mappable.get_clim(), max(3, most))
+        result.set_ticks([n * np.pi / 2 for n in halves], labels=[pi_label(n) for n in halves])
+        result.minorticks_off()
+    else:
+        result.locator = style.round_ticks(min(7, most))
     return result
+
+
+def pi_ticks(limits: tuple[float | None, float | None], most: int) -> list[int]:
+    """Return where to mark a phase axis, in halves of pi.
+
+    Parameters
+    ----------
+    limits
+        Lowest and highest phase, rad.
+    most
+        How many marks there is room for.
+
+    Returns
+    -------
+    list of int
+        Multiples of 2 (of pi, that is), or of a coarser step, or of 1 where the axis is so short
+        that it holds no two multiples of pi.
+    """
+    low, high = (0.0 if limit is None else limit / (np.pi / 2) for limit in limits)
+    halves = range(int(np.ceil(low - 1e-9)), int(np.floor(high + 1e-9)) + 1)
+    step = 2
+    while sum(n % step == 0 for n in halves) > most:
+        step *= 2
+    marks = [n for n in halves if n % step == 0]
+    return marks if len(marks) > 1 else list(halves)
+
+
+def pi_label(halves: int) -> str:
+    """Return how a phase of so many halves of pi is written."""
+    sign = "−" if halves < 0 else ""
+    whole, odd = divmod(abs(halves), 2)
+    if odd:
+        return f"{sign}{'' if abs(halves) == 1 else abs(halves)}π/2"
+    return "0" if whole == 0 else f"{sign}{'' if whole == 1 else whole}π"
 
 
 def beyond(values: Floats, limits: tuple[float, float]) -> Extend:
     """Return at which ends values lie beyond the limits."""
-    low, high = bool(np.nanmin(values) < limits[0]), bool(np.nanmax(values) > limits[1])
+    low, high = bool((values < limits[0]).any()), bool((values > limits[1]).any())
     names: dict[tuple[bool, bool], Extend] = {
         (False, False): "neither",
         (True, False): "min",
@@ -202,7 +267,7 @@ def explain_shadow(figure: Figure, left_mm: float, bottom_mm: float, text: str) 
     from matplotlib import patheffects
     from matplotlib.lines import Line2D
 
-    width, height = (float(size) * style.MM_PER_INCH for size in figure.get_size_inches())
+    width, height = style.page_mm(figure)
     piece = Line2D([], [], color="white", linewidth=0.5, label=text)
     piece.set_path_effects([patheffects.withStroke(linewidth=1.2, foreground="black")])
     figure.legend(

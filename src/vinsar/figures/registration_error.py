@@ -114,7 +114,7 @@ def _curves(
     axes.text(
         0.97,
         0.05 if rises else 0.95,
-        f"± {allowed:.1f} mm{'' if allowed < limit else ', beyond the axis'}",
+        f"± {allowed:.1f} mm" + ("" if allowed < limit else ",\nbeyond the axis"),
         transform=axes.transAxes,
         ha="right",
         va="bottom" if rises else "top",
@@ -130,14 +130,14 @@ def _title(registration: xr.Dataset, ground_axis: str, target: str, letter: str)
 def _map(figure: Figure, registration: xr.Dataset) -> None:
     """Draw the error by the circle over the scene, in tenths of a resolution cell."""
     part = registration.sel(ground_axis="y")
-    share = np.abs(part["map_circle"]) / (_ALLOWED_SHARE * part["map_resolution"])
-    width, height = maps.fit(share, 54, 66.5)
-    axes = style.place(figure, 109, 16, width, height)
+    share = abs(part["map_circle"]) / (_ALLOWED_SHARE * part["map_resolution"])
+    title = f"(e) in y by the circle, height {float(registration['map_height']):g} m"
+    axes = maps.place(figure, share, (110, 16, 53, 66.5), title)
     # White is exactly a tenth of a cell: blue needs no registration, red does.
     reach = min(1.0, max(0.1, float(np.ceil(10 * np.nanmax(np.abs(share.values - 1))) / 10)))
     limits = (1 - reach, 1 + reach)
     image = maps.draw(axes, share, colormap=style.colormap("cmc.vik"), limits=limits)
-    drawn = np.nanmin(share.values) < 1 < np.nanmax(share.values)
+    drawn = maps.beyond(share.values, (1.0, 1.0)) == "both"
     if drawn:
         axes.contour(
             share["x"].values,
@@ -147,9 +147,6 @@ def _map(figure: Figure, registration: xr.Dataset) -> None:
             colors="black",
             linewidths=0.8,
         )
-    axes.set_title(f"(e) in y by the circle, target height {float(registration['map_height']):g} m")
-    bar = maps.colorbar(
-        axes, image, "error / a tenth of a cell", extend=maps.beyond(share.values, limits)
-    )
+    bar = maps.colorbar(axes, image, "tenths of a cell", extend=maps.beyond(share.values, limits))
     if drawn:
         bar.ax.axhline(1, color="black", linewidth=0.8)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
+    from matplotlib.ticker import Locator
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -19,6 +20,7 @@ R = TypeVar("R")
 TWO_COLUMNS_MM = 180.0
 ONE_COLUMN_MM = 88.0
 MM_PER_INCH = 25.4
+TITLE_GAP_MM = 1.5
 
 BLUE, ORANGE, GREY, INK = "#0067a5", "#d95f02", "#8a8f94", "#1a1a1a"
 NO_DATA = "#c9c9c9"
@@ -29,7 +31,7 @@ STYLE: dict[str, Any] = {
     "mathtext.fontset": "dejavusans",
     "axes.titlesize": 8,
     "axes.titlelocation": "left",
-    "axes.titlepad": 3,
+    "axes.titlepad": 4.25,
     "axes.labelsize": 7.5,
     "axes.labelpad": 2,
     "axes.linewidth": 0.6,
@@ -73,7 +75,7 @@ def applied() -> Iterator[None]:
 
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(STYLE)
+        matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
         yield
 
 
@@ -106,6 +108,35 @@ def new_figure(width_mm: float, height_mm: float) -> Figure:
     return Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH))
 
 
+def page_mm(figure: Figure) -> tuple[float, float]:
+    """Return the width and height of a figure, mm."""
+    width, height = figure.get_size_inches()
+    return float(width) * MM_PER_INCH, float(height) * MM_PER_INCH
+
+
+def size_mm(axes: Axes) -> tuple[float, float]:
+    """Return the width and height of axes, mm."""
+    figure: Any = axes.get_figure(root=True)
+    width, height = page_mm(figure)
+    box = axes.get_position()
+    return width * box.width, height * box.height
+
+
+def write_title(figure: Figure, left_mm: float, top_mm: float, text: str) -> None:
+    """Write the title of axes whose upper left corner is at this place, mm."""
+    width, height = page_mm(figure)
+    figure.text(
+        left_mm / width, (top_mm + TITLE_GAP_MM) / height, text, fontsize=STYLE["axes.titlesize"]
+    )
+
+
+def round_ticks(most: int) -> Locator:
+    """Return a choice of about so many round numbers, at least two intervals of them."""
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(max(2, most), steps=[1, 2, 5, 10])
+
+
 def place(
     figure: Figure,
     left_mm: float,
@@ -132,7 +163,7 @@ def place(
     matplotlib.axes.Axes
         The axes.
     """
-    width, height = (float(size) * MM_PER_INCH for size in figure.get_size_inches())
+    width, height = page_mm(figure)
     box = (left_mm / width, bottom_mm / height, width_mm / width, height_mm / height)
     return figure.add_axes(box, **options)
 
@@ -164,11 +195,12 @@ def colormap(name: str, key: str = "colormap") -> Colormap:
     known: Any = matplotlib.colormaps
     if name.startswith("cmc."):
         # Not by their registration with Matplotlib: whatever imported them, the answer is one.
-        from cmcrameri import cm  # type: ignore[import-untyped]
+        from cmcrameri import cm
 
         known = {f"cmc.{short}": table for short, table in cm.cmaps.items()}
     if name not in known:
         near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
         hint = f"did you mean {' or '.join(near)}?" if near else "try cmc.batlow or viridis"
         raise ValueError(f"{key}: there is no colour map '{name}'; {hint}")
-    return known[name].with_extremes(bad=NO_DATA)  # type: ignore[no-any-return]
+    found: Colormap = known[name]
+    return found.with_extremes(bad=NO_DATA)

@@ -1,0 +1,106 @@
+"""Shared scenes of the library's tests: small, fixed and free of files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from vinsar import echo, geometry, imaging, trajectory, variables
+
+settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=60)
+settings.load_profile("reproducible")
+
+
+@pytest.fixture(scope="session")
+def rail():
+    """The antenna positions of Table 1: a vertical baseline of 0.3 m, the lower antenna at 2 m."""
+    return trajectory.rail(
+        aperture_length_m=0.8,
+        position_spacing_m=0.01,
+        rail_height_m=2.0,
+        baseline_m=0.3,
+        baseline_angle_deg=90.0,
+    )
+
+
+@pytest.fixture(scope="session")
+def bistatic(rail):
+    """The same transmitters with receivers elsewhere, as a switched array has them."""
+    return rail.assign(receiver=rail["receiver"] + [0.3, -0.1, 0.2])
+
+
+@pytest.fixture(scope="session")
+def scatterers():
+    """Make the product ``facets`` from positions (facet, 3) and their reflectivity."""
+
+    def make(positions, reflectivity=1.0):
+        positions = np.atleast_2d(np.asarray(positions, dtype=float))
+        values = np.broadcast_to(np.asarray(reflectivity, float), len(positions)).copy()
+        return variables.dataset(
+            "facets", {"facet_position": positions, "reflectivity": values}
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def focus():
+    """Take facets through echo, range compression and back-projection, without occlusion."""
+
+    def make(facets, antennas, frequency, x, y, z=0.0, **options):
+        window = options.get("window", "rectangular")
+        near, far = trajectory.range_extent(antennas, x, y, z)
+        profiles = imaging.compress(
+            echo.simulate(facets, antennas, frequency=frequency, accuracy_db=None),
+            near_range_m=near,
+            far_range_m=far,
+            window=window,
+            oversampling=options.get("oversampling", 16),
+        )
+        return imaging.backproject(profiles, antennas, x=x, y=y, z=z, window=window)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def ideal_phase():
+    """Make the products ``unwrapped`` and ``images`` of a smooth terrain without any radar.
+
+    A pixel (x, y') of the lower image shows the target (x, y, h(x, y)) on its circle; its phase
+    is that of the exact ranges (Eq. 1) less the flat-earth phase of the pixel (Eq. 11).
+    """
+
+    def make(terrain_height, x, y, *, lower=(0.0, 0.0, 2.0), upper=(0.0, 0.0, 2.3), constant=0.0):
+        wavelength = 0.0214
+        grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
+        true_y = grid_y.copy()
+        for _ in range(60):
+            height = terrain_height(grid_x, true_y)
+            # y of the circle around the lower aperture that passes through the pixel.
+            square = (grid_y - lower[1]) ** 2 + lower[2] ** 2 - (lower[2] - height) ** 2
+            true_y = lower[1] + np.sqrt(square)
+        difference = geometry.slant_range(lower, grid_x, true_y, height) - geometry.slant_range(
+            upper, grid_x, true_y, height
+        )
+        ground = geometry.slant_range(lower, grid_x, grid_y) - geometry.slant_range(
+            upper, grid_x, grid_y
+        )
+        phase = -4 * np.pi / wavelength * (difference - ground) + constant
+        unwrapped = variables.dataset(
+            "unwrapped",
+            {"phase": phase, "residue": np.zeros(phase.shape, np.int8)},
+            {"x": x, "y": y},
+        )
+        images = variables.dataset(
+            "images",
+            {
+                "image": np.ones((2, *phase.shape), np.complex64),
+                "wavelength": wavelength,
+                "phase_center": np.array([lower, upper]),
+            },
+            {"x": x, "y": y},
+        )
+        return unwrapped, images
+
+    return make

@@ -1,0 +1,88 @@
+"""Imports go one way; Numba stays in the kernels; the true scene stays out of the processing."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "vinsar"
+PROCESSING = ("imaging", "interferogram", "filtering", "unwrapping", "height")
+TRUTH = {"vinsar.scene", "vinsar.visibility", "vinsar.echo", "vinsar.accuracy"}
+
+
+def module_name(path):
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imports_of(path):
+    """Every module that a file names in an import, wherever the import stands."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            assert node.level == 0, f"{path} has a relative import"
+            found.add(node.module)
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return found
+
+
+def reached_from(name):
+    """The package's modules that a module imports, directly or through others."""
+    reached, waiting = set(), [name]
+    while waiting:
+        for other in imports_of(MODULES[waiting.pop()]) & set(MODULES):
+            # The package's own __init__ imports nothing.
+            if other not in reached and other != "vinsar":
+                reached.add(other)
+                waiting.append(other)
+    return reached
+
+
+def test_import_contracts_are_kept():
+    command = Path(sys.executable).parent / "lint-imports"
+    if not command.exists():
+        pytest.skip("import-linter is not installed")
+    result = subprocess.run(
+        [command, "--no-cache"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(PACKAGE.parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_only_kernels_import_numba(name):
+    uses = any(other.split(".")[0] == "numba" for other in imports_of(MODULES[name]))
+    assert not uses or name.startswith("vinsar.kernels.")
+
+
+def test_kernels_are_looked_at():
+    kernels = [name for name in MODULES if name.startswith("vinsar.kernels.")]
+    assert len(kernels) >= 3
+    assert all("numba" in imports_of(MODULES[name]) for name in kernels)
+
+
+@pytest.mark.parametrize("name", PROCESSING)
+def test_the_processing_never_reaches_the_true_scene(name):
+    reached = reached_from(f"vinsar.{name}")
+    assert "vinsar.variables" in reached, "or this test follows no imports"
+    assert not reached & TRUTH
+
+
+def test_the_library_knows_nothing_of_the_workflow():
+    for path in MODULES.values():
+        assert not any(other.split(".")[0] == "snakemake" for other in imports_of(path))

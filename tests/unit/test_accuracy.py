@@ -1,0 +1,121 @@
+"""Statistics of height errors, on numbers worked out by hand."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from vinsar import accuracy, variables
+
+COORDS = {"x": np.arange(4.0), "y": np.arange(2.0)}
+
+
+def dem(height):
+    zeros = np.zeros_like(height)
+    return variables.dataset(
+        "dem",
+        {"height": height, "image_height": zeros, "absolute_phase": zeros, "phase_offset": zeros},
+        COORDS,
+    )
+
+
+def truth(height, shadow):
+    return variables.dataset(
+        "truth",
+        {
+            "height": height,
+            "reflectivity": np.ones_like(height),
+            "visible_fraction": np.ones((2, *height.shape)),
+            "shadow": shadow,
+        },
+        COORDS,
+    )
+
+
+def test_statistics_of_five_errors():
+    found = accuracy.statistics(np.array([-0.04, 0.01, 0.02, 0.03, 0.08]), 0.04)
+    assert found == pytest.approx(
+        {
+            "mean": 0.02,
+            "std": np.sqrt((36 + 1 + 0 + 1 + 36) / 5) / 100,
+            "median": 0.02,
+            "mad": 0.01,
+            # 95 % of the way from the first to the last of 0.01 0.02 0.03 0.04 0.08.
+            "percentile_95_absolute": 0.04 + 0.8 * 0.04,
+            "maximum_absolute": 0.08,
+            "fraction_within_tolerance": 0.8,
+            "fraction_reconstructed": 1.0,
+            "cell_count": 5,
+        }
+    )
+
+
+def test_cells_without_a_height_count_as_not_within():
+    found = accuracy.statistics(np.array([0.0, 0.02, np.nan, np.nan]), 0.05)
+    assert found["mean"] == pytest.approx(0.01)
+    assert found["maximum_absolute"] == pytest.approx(0.02)
+    assert found["fraction_within_tolerance"] == 0.5
+    assert found["fraction_reconstructed"] == 0.5
+    assert found["cell_count"] == 4
+
+
+@pytest.mark.parametrize("error", [np.array([]), np.array([np.nan, np.nan])])
+def test_where_there_is_nothing_to_count_statistics_are_nan(error):
+    found = accuracy.statistics(error, 0.05)
+    assert np.isnan([found["mean"], found["std"], found["maximum_absolute"]]).all()
+    assert found["cell_count"] == error.size
+    np.testing.assert_equal(
+        found["fraction_reconstructed"], 0.0 if error.size else np.nan
+    )
+
+
+@pytest.fixture
+def scored():
+    height = np.array([[0.0, 0.0, 0.5, np.nan], [1.0, 1.0, 1.0, np.nan]])
+    shadow = np.array([[False, True, True, False], [False, False, False, False]])
+    error = np.array([[0.01, 0.30, np.nan, 9.0], [-0.01, np.nan, 0.06, 9.0]])
+    return accuracy.evaluate(
+        dem(np.where(np.isnan(height), 9.0, height + error)), truth(height, shadow), tolerance_m=0.05
+    )
+
+
+def test_errors_are_reconstructed_minus_true(scored):
+    expected = [[0.01, 0.30, np.nan, np.nan], [-0.01, np.nan, 0.06, np.nan]]
+    np.testing.assert_allclose(scored["height_error"].values, expected, atol=1e-12)
+
+
+def test_regions_split_the_scene_by_shadow_and_leave_out_what_is_beyond(scored):
+    assert scored["region"].values.tolist() == ["whole_scene", "visible_ground", "shadow"]
+    assert scored["cell_count"].values.tolist() == [6, 4, 2]
+    np.testing.assert_allclose(scored["fraction_reconstructed"], [4 / 6, 3 / 4, 1 / 2])
+    np.testing.assert_allclose(scored["fraction_within_tolerance"], [2 / 6, 2 / 4, 0])
+    np.testing.assert_allclose(scored["mean"], [0.09, 0.02, 0.30])
+    np.testing.assert_allclose(scored["maximum_absolute"], [0.30, 0.06, 0.30])
+    assert float(scored["tolerance"]) == 0.05
+
+
+def test_grids_that_differ_are_refused():
+    small = truth(np.zeros((2, 4)), np.zeros((2, 4), bool)).isel(x=slice(3))
+    with pytest.raises(ValueError, match=r"a DEM of \(2, 4\) .* a truth of \(2, 3\)"):
+        accuracy.evaluate(dem(np.zeros((2, 4))), small, tolerance_m=0.05)
+
+
+def test_grids_of_one_shape_at_other_places_are_refused():
+    moved = truth(np.zeros((2, 4)), np.zeros((2, 4), bool)).assign_coords(x=np.arange(4.0) + 1)
+    with pytest.raises(ValueError, match="DEM|grid"):
+        accuracy.evaluate(dem(np.zeros((2, 4))), moved, tolerance_m=0.05)
+
+
+def test_summary_is_json_with_units_and_null_where_undefined():
+    height, nothing = np.zeros((2, 4)), np.zeros((2, 4), bool)
+    scored = accuracy.evaluate(dem(height + 0.02), truth(height, nothing), tolerance_m=0.05)
+    found = json.loads(json.dumps(accuracy.summary(scored), allow_nan=False))
+    assert found["tolerance_m"] == 0.05
+    assert found["whole_scene"]["mean_error_m"] == pytest.approx(0.02)
+    assert found["whole_scene"]["cell_count"] == 8
+    assert found["shadow"]["cell_count"] == 0
+    assert found["shadow"]["std_error_m"] is None
+    assert found["shadow"]["fraction_within_tolerance"] is None
+    assert set(found) == {"tolerance_m", *accuracy.REGIONS}

@@ -1,0 +1,62 @@
+import hashlib
+import json
+
+import pytest
+
+from vinsar import pipeline, provenance
+
+
+def names(*modules):
+    return {path.stem for path in provenance.sources_of(*modules)}
+
+
+def test_sources_follow_imports_inside_functions():
+    assert {"visibility", "scene", "fan", "blocks"} <= names("visibility")
+
+
+def test_sources_leave_out_what_is_not_imported():
+    assert not {"echo", "scene", "visibility", "imaging", "height"} & names("filtering")
+
+
+def test_imports_for_type_checkers_do_not_count():
+    # Figures know the pipeline's types, but run none of its code.
+    assert not {"pipeline", "echo", "unwrapping"} & names("figures")
+
+
+def test_the_processing_runs_no_code_that_knows_the_scene():
+    for stage in ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem"):
+        assert not {"scene", "visibility", "echo", "accuracy"} & names(
+            *pipeline.STAGES[stage].modules
+        )
+
+
+def test_an_unknown_module_is_named():
+    with pytest.raises(ValueError, match="no module 'filterign'"):
+        provenance.sources_of("filterign")
+
+
+def test_sha256_is_that_of_the_bytes(tmp_path):
+    (tmp_path / "a").write_bytes(b"radar")
+    assert provenance.sha256(tmp_path / "a") == hashlib.sha256(b"radar").hexdigest()
+
+
+def test_the_code_digest_tells_content_and_name_but_not_folder(tmp_path):
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "a.py").write_text("x = 1\n")
+    one, two = ([tmp_path / folder / "a.py"] for folder in ("one", "two"))
+    assert provenance.code_digest(one) == provenance.code_digest(two)
+    two[0].write_text("x = 2\n")
+    assert provenance.code_digest(one) != provenance.code_digest(two)
+
+
+def test_a_description_tells_inputs_configuration_and_versions(tmp_path):
+    source = tmp_path / "in.nc"
+    source.write_bytes(b"1")
+    found = provenance.describe(
+        study="s", stage="dem", configuration={"b": 1, "a": 2}, inputs={"images": source}, code=[]
+    )
+    assert json.loads(found["vinsar_inputs"]) == {"images": provenance.sha256(source)}
+    assert found["vinsar_configuration"] == '{"a": 2, "b": 1}'
+    assert set(json.loads(found["vinsar_libraries"])) >= {"numpy", "scipy", "numba", "xarray"}
+    assert str(tmp_path) not in json.dumps(found)

@@ -1,0 +1,88 @@
+"""Antenna positions by channel and position."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vinsar import trajectory
+
+
+def make(angle_deg, **changes):
+    options = {
+        "aperture_length_m": 0.8,
+        "position_spacing_m": 0.01,
+        "rail_height_m": 2.0,
+        "baseline_m": 0.3,
+        "baseline_angle_deg": angle_deg,
+    }
+    return trajectory.rail(**(options | changes))
+
+
+def test_table_1_has_81_positions_centred_on_the_vehicle(rail):
+    x = rail["transmitter"].sel(axis="x")
+    assert rail.sizes["position"] == 81
+    for channel in ("lower", "upper"):
+        np.testing.assert_allclose(x.sel(channel=channel), np.arange(-40, 41) / 100, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angle", "offset_y", "offset_z"),
+    [
+        (90.0, 0.0, 0.3),
+        (45.0, 0.3 / np.sqrt(2), 0.3 / np.sqrt(2)),
+        (0.0, 0.3, 0.0),
+        (120.0, -0.15, 0.15 * np.sqrt(3)),
+    ],
+)
+def test_upper_antenna_stands_a_baseline_away_at_its_attitude(angle, offset_y, offset_z):
+    antennas = make(angle)["transmitter"]
+    lower, upper = antennas.sel(channel="lower").values, antennas.sel(channel="upper").values
+    np.testing.assert_array_equal(lower[:, 1:], np.tile([0.0, 2.0], (81, 1)))
+    expected = np.tile([0.0, offset_y, offset_z], (81, 1))
+    np.testing.assert_allclose(upper - lower, expected, atol=1e-15)
+
+
+def test_a_vertical_baseline_has_no_forward_offset_at_all(rail):
+    assert np.all(rail["transmitter"].sel(axis="y").values == 0)
+
+
+def test_transmitter_and_receiver_are_equal_but_stand_on_their_own():
+    antennas = make(90.0)
+    np.testing.assert_array_equal(antennas["transmitter"].values, antennas["receiver"].values)
+    assert not np.shares_memory(antennas["transmitter"].values, antennas["receiver"].values)
+
+
+def test_a_spacing_that_does_not_divide_the_aperture_is_refused():
+    with pytest.raises(ValueError, match="not a multiple of the spacing"):
+        make(90.0, position_spacing_m=0.03)
+
+
+def test_phase_centers_lie_midway_between_transmitter_and_receiver(rail, bistatic):
+    np.testing.assert_allclose(
+        trajectory.phase_centers(rail), [[0, 0, 2.0], [0, 0, 2.3]], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        trajectory.phase_centers(bistatic), [[0.15, -0.05, 2.1], [0.15, -0.05, 2.4]], atol=1e-12
+    )
+
+
+@given(
+    left=st.floats(-3, 1), right=st.floats(0.1, 3), near=st.floats(-1, 9),
+    depth=st.floats(0.1, 3), low=st.floats(-0.5, 3), high=st.floats(0, 0.5),
+)  # fmt: skip
+def test_range_extent_encloses_every_range_and_no_more(rail, left, right, near, depth, low, high):
+    x, y = np.linspace(left, left + right, 25), np.linspace(near, near + depth, 25)
+    z = np.linspace(low, low + high, 9)
+    least, most = trajectory.range_extent(rail, x, y, z)
+    antennas = rail["transmitter"].values[:, ::8].reshape(-1, 3)
+    points = np.stack(np.meshgrid(x, y, z, indexing="ij"), -1).reshape(-1, 3)
+    distance = np.linalg.norm(points[:, None] - antennas[None], axis=-1)
+    # The farthest point of a box is a corner. The nearest is within half a diagonal of a sample,
+    # and seen from within 0.04 m of one of the antennas taken here.
+    half_step = np.linalg.norm([x[1] - x[0], y[1] - y[0], z[1] - z[0]]) / 2
+    assert distance.max() == pytest.approx(most, rel=1e-12)
+    assert least <= distance.min() + 1e-12
+    assert distance.min() <= least + half_step + 0.04

@@ -1,0 +1,167 @@
+import copy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from vinsar import validation
+
+CONFIG = Path(__file__).parents[2] / "config"
+PAPER = yaml.safe_load((CONFIG / "paper.yaml").read_text())
+RECTANGLE = {"x_min_m": -1.0, "x_max_m": 1.0, "y_min_m": 10.5, "y_max_m": 11.0}
+
+
+def changed(**values):
+    """Return the paper's configuration with ``section__key`` set."""
+    raw = copy.deepcopy(PAPER)
+    for path, value in values.items():
+        section, _, key = path.partition("__")
+        if key:
+            raw[section][key] = value
+        else:
+            raw[section] = value
+    return raw
+
+
+def faults(raw) -> dict[str, str]:
+    with pytest.raises(validation.ConfigurationError) as caught:
+        validation.check(raw)
+    assert all(str(fault) in str(caught.value) for fault in caught.value.faults)
+    return {fault.key: fault.allowed for fault in caught.value.faults}
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_shipped_study_is_valid(path):
+    assert validation.load(CONFIG / "paper.yaml", path).study == path.stem
+
+
+def test_the_paper_is_wise():
+    assert validation.advice(validation.check(PAPER)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "says"),
+    [
+        ({"radar__baseline": 0.3}, "radar.baseline", "did you mean radar.baseline_m"),
+        ({"radr": {}}, "radr", "did you mean radar"),
+        ({"seed": -1}, "seed", "greater than or equal to 0"),
+        ({"study": "a/b"}, "study", "match pattern"),
+        ({"scene__terrain": "peak"}, "scene.terrain", "'peaks' or 'flat'"),
+        ({"radar__stop_frequency_hz": "15e9"}, "radar.stop_frequency_hz", "write 15000000000"),
+        ({"radar__stop_frequency_hz": 12e9}, "radar.stop_frequency_hz", "must exceed"),
+        ({"radar__baseline_m": -0.3}, "radar.baseline_m", "greater than 0"),
+        ({"radar__position_spacing_m": 0.03}, "radar.position_spacing_m", "must divide"),
+        ({"scene__x_max_m": -3.0}, "scene.x_max_m", "must exceed x_min_m"),
+        ({"scene__terrain_spacing_m": 0.011}, "scene.terrain_spacing_m", "must divide"),
+        ({"scene__reflectivity_offset": 0.1}, "scene.reflectivity_offset", "at least 0.24"),
+        ({"imaging__grid_spacing_m": 0.021}, "imaging.grid_spacing_m", "must divide"),
+        ({"scene__y_min_m": -5.0}, "scene.y_min_m", "look ahead"),
+        ({"radar__frequency_count": 101}, "scene.y_max_m", "unambiguous range, 7.49 m"),
+        ({"scene__facet_size_m": 0.05}, "scene.facet_size_m", "half a resolution cell"),
+        ({"radar__position_spacing_m": 0.04}, "radar.position_spacing_m", "ambiguously"),
+        ({"imaging__grid_spacing_m": 0.1}, "imaging.grid_spacing_m", "at most the resolution"),
+        ({"interferogram__coherence_window_px": 4}, "interferogram.coherence_window_px", "odd"),
+        ({"filtering__goldstein_step_px": 24}, "filtering.goldstein_step_px", "1, 2, 4, 8, 16, 32"),
+        ({"registration__height_max_m": -1.0}, "registration.height_max_m", "must exceed"),
+        (
+            {"registration__near": {"x_m": 0.0, "y_m": 0.5}, "registration__height_max_m": 1.0},
+            "registration.near.y_m",
+            "no image on the ground",
+        ),
+        ({"height__level_ground": []}, "height.level_ground", "one rectangle or more"),
+        (
+            {"height__level_ground": [RECTANGLE | {"y_max_m": 17.0}]},
+            "height.level_ground[0]",
+            "must lie in the image",
+        ),
+        (
+            {"height__level_ground": [RECTANGLE | {"y_mx_m": 17.0}]},
+            "height.level_ground[0].y_mx_m",
+            "did you mean height.level_ground.y_max_m",
+        ),
+        (
+            {"height__reference": "control_points", "height__trend": "plane"},
+            "height.control_points",
+            "must hold 3 or more",
+        ),
+        ({"figures__height_colormap": "cmc.batlov"}, "figures.height_colormap", "cmc.batlow"),
+        ({"figures__phase_colormap": "twilght"}, "figures.phase_colormap", "twilight"),
+    ],
+)
+def test_a_fault_names_its_key_and_what_is_allowed(change, key, says):
+    found = faults(changed(**change))
+    assert says in found[key]
+
+
+def test_all_faults_come_in_one_message():
+    raw = changed(
+        radar__baselin_m=0.3, scene__facet_size_m="small", filtering__goldstein_step_px=24,
+        imaging__x_max_m=-9.0,
+    )  # fmt: skip
+    assert set(faults(raw)) == {
+        "radar.baselin_m",
+        "scene.facet_size_m",
+        "filtering.goldstein_step_px",
+        "imaging.x_max_m",
+    }
+
+
+def test_the_advised_frequency_count_suffices():
+    advice = faults(changed(radar__frequency_count=101))["scene.y_max_m"]
+    count = int(advice.split("frequency_count ")[1].split()[0])
+    validation.check(changed(radar__frequency_count=count))
+    faults(changed(radar__frequency_count=count - 1))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"radar__baseline_m": 2.5}, "quarter of the critical baseline, 1.821 m"),
+        ({"scene__facet_size_m": 0.02}, "below the wavelength, 0.0214 m"),
+        ({"imaging__y_max_m": 17.0}, "beyond the scene"),
+    ],
+)
+def test_what_is_unwise_is_said_and_allowed(change, says):
+    (sentence,) = validation.advice(validation.check(changed(**change)))
+    assert says in sentence
+
+
+def test_files_override_in_order(tmp_path):
+    first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
+    first.write_text("seed: 1\nradar: {baseline_m: 0.4, rail_height_m: 2.5}\n")
+    second.write_text("radar: {baseline_m: 0.5}\n")
+    study = validation.load(CONFIG / "paper.yaml", first, second)
+    assert (study.seed, study.radar.baseline_m, study.radar.rail_height_m) == (1, 0.5, 2.5)
+    assert study.radar.aperture_length_m == 0.8
+
+
+@pytest.mark.parametrize("content", ["radar: [", "- 1\n"])
+def test_a_file_that_is_no_configuration_is_named(tmp_path, content):
+    path = tmp_path / "broken.yaml"
+    path.write_text(content)
+    with pytest.raises(ValueError, match=r"broken\.yaml"):
+        validation.load(path)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ValueError, match=r"absent\.yaml"):
+        validation.load(tmp_path / "absent.yaml")
+
+
+def test_variants_are_checked_as_studies_all_at_once():
+    raw = changed(variants={"good": {"seed": 1}, "bad": {"seed": -1}, "worse": {"rader": {}}})
+    study = validation.check(raw)
+    with pytest.raises(validation.ConfigurationError) as caught:
+        validation.variants(study)
+    assert [fault.key for fault in caught.value.faults] == [
+        "variants.bad: seed",
+        "variants.worse: rader",
+    ]
+
+
+def test_a_variant_is_the_study_but_for_its_changes():
+    study = validation.check(changed(variants={"low": {"radar": {"rail_height_m": 1.8}}}))
+    low = validation.variants(study)["low"]
+    assert low.radar == study.radar.model_copy(update={"rail_height_m": 1.8})
+    assert low.scene == study.scene
+    assert low.variants == {}

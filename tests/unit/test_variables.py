@@ -1,0 +1,122 @@
+"""Declared variables: what departs from them is refused by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vinsar import variables
+
+DECLARED = [
+    (product, name, variable)
+    for product, entries in variables.PRODUCTS.items()
+    for name, variable in entries.items()
+]
+
+
+def terrain(**changes):
+    data = {"height": np.zeros((2, 3)), "reflectivity": np.ones((2, 3))} | changes
+    return variables.dataset("terrain", data, {"x": np.arange(3.0), "y": np.arange(2.0)})
+
+
+def test_a_dataset_has_the_declared_dimensions_attributes_and_coordinates():
+    data = terrain()
+    assert data["height"].dims == ("y", "x")
+    assert data["height"].attrs == {
+        "long_name": "true height above the ground plane",
+        "units": "m",
+    }
+    assert data["x"].attrs["units"] == "m"
+    assert data["x"].values.tolist() == [0, 1, 2]
+    variables.check(data, "terrain")
+
+
+def test_labels_and_counts_are_filled_in():
+    data = variables.dataset(
+        "trajectory", {name: np.zeros((2, 4, 3)) for name in ("transmitter", "receiver")}
+    )
+    assert data["channel"].values.tolist() == ["lower", "upper"]
+    assert data["axis"].values.tolist() == ["x", "y", "z"]
+    assert data["position"].values.tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"colour": np.zeros((2, 3))}, "has no variable 'colour'"),
+        ({"height": np.zeros(3)}, "'height' of product 'terrain' has 1 dimensions"),
+        ({"height": np.zeros((2, 3), complex)}, "'height' of product 'terrain' is complex128"),
+        ({"height": np.zeros((2, 3), int)}, "'height' of product 'terrain' is int64"),
+    ],
+)
+def test_a_dataset_that_departs_is_not_made(changes, message):
+    with pytest.raises(ValueError, match=message):
+        terrain(**changes)
+
+
+def test_a_missing_variable_is_named():
+    with pytest.raises(ValueError, match="lacks the variable 'reflectivity'"):
+        variables.dataset("terrain", {"height": np.zeros((2, 3))})
+
+
+def test_sizes_that_disagree_are_refused():
+    with pytest.raises(ValueError, match="x"):
+        terrain(reflectivity=np.ones((2, 4)))
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda data: data.drop_vars("height"), "lacks the variable 'height'"),
+        (lambda data: data.drop_vars("x"), "lacks the variable 'x'"),
+        (lambda data: data.assign(extra=data["height"]), "has no variable 'extra'"),
+        (lambda data: data.transpose("x", "y"), "'height' .* has the dimensions"),
+        (lambda data: data.assign(height=data["height"] > 0), "'height' .* is bool"),
+        (lambda data: data.astype(np.float16), "'height' .* is float16"),
+        (
+            lambda data: data.assign(height=data["height"].assign_attrs(units="km")),
+            "'height' .* has units='km', but 'm' is declared",
+        ),
+        (
+            lambda data: data.assign_coords(x=data["x"].assign_attrs(long_name="width")),
+            "'x' .* has long_name='width'",
+        ),
+    ],
+)
+def test_check_refuses_each_kind_of_departure_by_name(damage, message):
+    with pytest.raises(ValueError, match=message):
+        variables.check(damage(terrain()), "terrain")
+
+
+@pytest.mark.parametrize(("product", "name", "variable"), DECLARED)
+def test_every_variable_has_a_name_a_unit_and_declared_dimensions(product, name, variable):
+    del product, name
+    assert variable.long_name
+    assert bool(variable.units) != (variable.kind == "label")
+    assert set(variable.dims) <= set(variables.COORDINATES)
+    assert len(set(variable.dims)) == len(variable.dims)
+    assert bool(variable.flag_meanings) == (variable.kind == "flag")
+    assert len(variable.flag_meanings.split()) in (0, 2)
+
+
+def test_every_coordinate_is_one_dimensional_and_named():
+    for name, variable in variables.COORDINATES.items():
+        assert variable.dims == (name,)
+        assert variable.long_name
+        assert bool(variable.units) != (variable.kind == "label")
+
+
+def test_every_unit_is_one_that_udunits_knows():
+    units = {variable.units for _, _, variable in DECLARED}
+    units |= {variable.units for variable in variables.COORDINATES.values()}
+    assert units <= {"", "1", "m", "Hz", "radian"}
+
+
+def test_inputs_are_not_changed_and_results_come_in_one_order():
+    coords = {"y": np.arange(2.0), "x": np.arange(3.0)}
+    kept = dict(coords)
+    data = {"height": np.zeros((2, 3)), "reflectivity": np.ones((2, 3))}
+    first = variables.dataset("terrain", data, coords)
+    second = variables.dataset("terrain", data, dict(reversed(coords.items())))
+    assert coords.keys() == kept.keys()
+    assert list(first.variables) == list(second.variables)

@@ -1,0 +1,189 @@
+"""The workflow as a user runs it: on a copy of the repository, with a tiny study."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from vinsar import accuracy, claims, figures, pipeline, storage, validation
+
+ROOT = Path(__file__).parents[2]
+FIGURE_RULES = {"fig1", "fig2", "fig3", "fig3_panels", "fig4"}
+AFTER_FILTERING = {
+    "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims", "fig3",
+    "fig3_panels", "fig4",
+}  # fmt: skip
+
+
+class Checkout:
+    """A copy of the repository in which Snakemake runs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        for name in ("src", "workflow", "config", "profiles"):
+            ignore = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / name, folder / name, ignore=ignore)
+        for path in (ROOT / "Snakefile", ROOT / "tests/workflow/tiny.yaml"):
+            shutil.copy(path, folder)
+        self.results = folder / "results/tiny"
+
+    def snakemake(self, *arguments: str, extra: str = "") -> subprocess.CompletedProcess[str]:
+        files = ["tiny.yaml"]
+        if extra:
+            (self.folder / "extra.yaml").write_text(extra)
+            files.append("extra.yaml")
+        return subprocess.run(
+            [sys.executable, "-m", "snakemake", "--configfile", *files, "--nocolor", *arguments],
+            cwd=self.folder,
+            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    def would_run(self, extra: str = "") -> set[str]:
+        """Return the rules that a dry run names."""
+        done = self.snakemake("-n", extra=extra)
+        assert done.returncode == 0, done.stderr
+        if "Nothing to be done" in done.stdout + done.stderr:
+            return set()
+        table = re.search(r"^job +count\n-.*?\n(.*?)^total", done.stdout, re.MULTILINE | re.DOTALL)
+        assert table, done.stdout
+        return {line.split()[0] for line in table[1].splitlines()} - {"all"}
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory):
+    """A checkout whose study has been run once."""
+    made = Checkout(tmp_path_factory.mktemp("checkout"))
+    done = made.snakemake()
+    assert done.returncode == 0, done.stdout + done.stderr
+    return made
+
+
+@pytest.fixture(scope="module")
+def study():
+    return validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+
+
+@pytest.fixture(scope="module")
+def products(study):
+    return pipeline.run(study)
+
+
+def test_the_workflow_gives_the_same_numbers_as_the_library(checkout, products):
+    for name in pipeline.STAGES:
+        stored = storage.read(checkout.results / f"{name}.nc", name)
+        stored.attrs = {}
+        xr.testing.assert_identical(stored, products[name])
+
+
+def test_the_summary_and_the_claims_are_those_of_the_library(checkout, products, study):
+    summary = json.loads((checkout.results / "accuracy.json").read_text())
+    assert summary == accuracy.summary(products["accuracy"])
+    found = claims.evaluate(products, study)
+    assert json.loads((checkout.results / "claims.json").read_text()) == claims.as_json(found)
+    assert (checkout.results / "claims.md").read_text() == claims.as_markdown(found)
+
+
+def test_every_figure_is_there_in_every_format(checkout):
+    made = {path.name for path in (checkout.results / "figures").iterdir()}
+    assert made == {f"{name}.{end}" for name in figures.FIGURES for end in ("pdf", "svg", "png")}
+
+
+def test_each_product_tells_the_inputs_and_sections_that_its_stage_declares(checkout):
+    for name, stage in pipeline.STAGES.items():
+        attributes = storage.read(checkout.results / f"{name}.nc", name).attrs
+        assert set(json.loads(attributes["vinsar_inputs"])) == set(stage.inputs), name
+        assert set(json.loads(attributes["vinsar_configuration"])) == set(stage.sections), name
+
+
+def test_a_second_run_has_nothing_to_do(checkout):
+    assert checkout.would_run() == set()
+
+
+def test_a_touch_reruns_nothing(checkout):
+    for folder in ("src", "workflow", "config"):
+        for path in (checkout.folder / folder).rglob("*"):
+            path.touch()
+    for path in checkout.results.glob("*.nc"):
+        path.touch()
+    assert checkout.would_run() == set()
+
+
+def test_a_colour_map_reruns_only_figures(checkout):
+    assert checkout.would_run("figures: {height_colormap: viridis}\n") == FIGURE_RULES
+
+
+def test_a_filter_setting_reruns_the_filter_and_what_follows(checkout):
+    assert checkout.would_run("filtering: {goldstein_alpha: 0.5}\n") == AFTER_FILTERING
+
+
+def test_an_edit_of_filtering_reruns_the_filter_and_what_follows(checkout):
+    path = checkout.folder / "src/vinsar/filtering.py"
+    before = path.read_text()
+    path.write_text(before + "\n_EDITED = True\n")
+    try:
+        assert checkout.would_run() == AFTER_FILTERING
+    finally:
+        path.write_text(before)
+
+
+def test_a_kernel_edit_reruns_what_runs_it(checkout):
+    path = checkout.folder / "src/vinsar/kernels/backprojection.py"
+    before = path.read_text()
+    path.write_text(before + "\n_EDITED = True\n")
+    try:
+        rules = checkout.would_run()
+    finally:
+        path.write_text(before)
+    assert {"images", "registration", "dem"} <= rules
+    assert not {"trajectory", "terrain", "facets", "visibility", "truth", "echo"} & rules
+
+
+def test_a_rail_height_reruns_no_facet(checkout):
+    rules = checkout.would_run("radar: {rail_height_m: 2.2}\n")
+    assert {"trajectory", "echo", "fig1", "claims"} <= rules
+    assert not {"terrain", "facets"} & rules
+
+
+def test_a_truncated_product_is_named_with_what_to_do(checkout):
+    path = checkout.results / "interferogram.nc"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:9000])
+    done = checkout.snakemake()
+    said = done.stdout + done.stderr
+    assert done.returncode != 0
+    assert "results/tiny/interferogram.nc is truncated or not netCDF" in said
+    assert "delete it and run again" in said
+    assert "Traceback" not in said
+    path.unlink()
+    done = checkout.snakemake("results/tiny/dem.nc")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert path.read_bytes() == whole
+
+
+def test_a_wrong_configuration_starts_no_job(tmp_path):
+    made = Checkout(tmp_path)
+    done = made.snakemake(
+        extra="radar: {baselin_m: 0.3}\nscene: {facet_size_m: 0.2}\nfiltering: {method: lee}\n"
+    )
+    said = done.stdout + done.stderr
+    assert done.returncode == 1
+    assert "The configuration has 3 faults" in said
+    for key in ("radar.baselin_m", "scene.facet_size_m", "filtering.method"):
+        assert key in said
+    assert "Traceback" not in said
+    assert not made.results.exists()
+
+
+def test_what_is_unwise_is_said_before_the_jobs(checkout):
+    done = checkout.snakemake("-n", extra="radar: {baseline_m: 2.5}\n")
+    assert done.returncode == 0
+    assert "a quarter of the critical baseline" in done.stdout + done.stderr
