@@ -27,6 +27,7 @@ include: "workflow/rules/imaging.smk"
 include: "workflow/rules/registration.smk"
 include: "workflow/rules/interferogram.smk"
 include: "workflow/rules/height.smk"
+include: "workflow/rules/sweep.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 

@@ -37,9 +37,7 @@ def scatterers():
     def make(positions, reflectivity=1.0):
         positions = np.atleast_2d(np.asarray(positions, dtype=float))
         values = np.broadcast_to(np.asarray(reflectivity, float), len(positions)).copy()
-        return variables.dataset(
-            "facets", {"facet_position": positions, "reflectivity": values}
-        )
+        return variables.dataset("facets", {"facet_position": positions, "reflectivity": values})
 
     return make
 

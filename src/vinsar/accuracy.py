@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar import variables
+from vinsar.constants import REGIONS
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-REGIONS = ("whole_scene", "visible_ground", "shadow")
 _STATISTICS = (
     "mean",
     "std",
@@ -81,11 +81,13 @@ def evaluate(dem: xr.Dataset, truth: xr.Dataset, *, tolerance_m: float) -> xr.Da
     ValueError
         If the grids differ.
     """
-    if dem["height"].shape != truth["height"].shape:
-        raise ValueError(
-            f"a DEM of {dem['height'].shape} cells cannot be held against a truth of "
-            f"{truth['height'].shape}"
-        )
+    for axis in ("x", "y"):
+        ours, theirs = dem[axis].values, truth[axis].values
+        if ours.shape != theirs.shape or not np.allclose(ours, theirs, rtol=0, atol=1e-9):
+            raise ValueError(
+                f"the DEM's {axis} runs from {ours[0]:g} to {ours[-1]:g} m in {ours.size} cells, "
+                f"the truth's from {theirs[0]:g} to {theirs[-1]:g} m in {theirs.size}"
+            )
     error = dem["height"].values - truth["height"].values
     shadow = truth["shadow"].values
     exists = np.isfinite(truth["height"].values)

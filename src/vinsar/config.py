@@ -6,12 +6,12 @@ Checks that need radar physics are in `vinsar.validation`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
 
 def _key(description: str, paper: str, **bounds: Any) -> Any:
@@ -86,6 +86,32 @@ class Echo(Section):
     )
     accuracy_db: float = _key(
         "largest error of the fast sum against the direct one", "not given", ge=-200, le=-40
+    )
+
+
+class Motion(Section):
+    """Errors of the antenna positions (Fig. 5)."""
+
+    axis: Literal["x", "y", "z"] = _key("axis along which the positions err", "section 2.4")
+    level_wavelengths: float = _key(
+        "standard deviation of the error in wavelengths; 0 for none", "Fig. 5", ge=0
+    )
+    distribution: Literal["uniform", "normal"] = _key(
+        "of the errors; a uniform one has the half-width sqrt(3) sigma", "section 2.4"
+    )
+    channels: Literal["common", "independent"] = _key(
+        "one error for both antennas (the vehicle shakes), or one for each (their positions are "
+        "measured by themselves)",
+        "not given",
+    )
+    spectrum: Literal["white", "sinusoidal", "random_walk"] = _key(
+        "independent errors, one vibration, or drift", "section 2.4 has white errors"
+    )
+    cycles_per_aperture: float = _key("periods of the vibration over the scan", "ours", gt=0)
+    affects: Literal["recorded", "true"] = _key(
+        "what errs: the positions that imaging is told, or the true ones while it is told the "
+        "undisturbed ones",
+        "section 2.4 has measurement errors",
     )
 
 
@@ -204,6 +230,38 @@ class Figures(Section):
     png_dpi: int = _key("resolution of the PNG files", "not given", ge=50, le=1200)
 
 
+Override = dict[str, Any]
+
+
+class Sweep(Section):
+    """A sweep over keys of the configuration."""
+
+    over: dict[str, Annotated[tuple[Any, ...], Field(strict=False, min_length=1)]] = _key(
+        "values by dotted key, such as `radar.baseline_m`; the product of all lists is swept",
+        "ours",
+        min_length=1,
+    )
+    realizations: int = _key(
+        "independent repetitions of each case: other speckle, noise and errors", "ours", ge=1
+    )
+    base: Override = _key("overrides that hold for all of its cases", "ours")
+
+
+class Dask(Section):
+    """Where sweeps run."""
+
+    scheduler: Literal["threads", "processes"] = _key(
+        "workers of this machine: threads share what they have computed, processes survive a "
+        "crash of one",
+        "ours",
+    )
+    address: str | None = _key(
+        "address of a Dask scheduler that runs them instead; null for Dask's own configuration "
+        "(DASK_SCHEDULER_ADDRESS) or this machine",
+        "ours",
+    )
+
+
 class Study(Section):
     """A whole study."""
 
@@ -213,9 +271,11 @@ class Study(Section):
         pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$",
     )
     seed: int = _key("seed of everything random", "ours", ge=0)
+    realization: int = _key("number of the realization of everything random", "ours", ge=0)
     radar: Radar
     scene: Scene
     echo: Echo
+    motion: Motion
     imaging: Imaging
     interferogram: Interferogram
     filtering: Filtering
@@ -224,8 +284,12 @@ class Study(Section):
     accuracy: Accuracy
     registration: Registration
     figures: Figures
-    variants: dict[str, dict[str, Any]] = _key(
+    dask: Dask
+    variants: dict[str, Override] = _key(
         "overrides by name; `./run variants` tabulates the accuracy of each", "ours"
+    )
+    sweeps: dict[str, Sweep] = _key(
+        "sweeps by name; `./run results/<study>/sweeps/<name>.nc` computes one", "ours"
     )
 
     @classmethod
@@ -237,7 +301,8 @@ class Study(Section):
         Parameters
         ----------
         values
-            Sections, as models or as plain values, by name.
+            Sections, as models or as plain values, by name; a name such as
+            ``radar.frequency_count`` stands for a single key of a section.
 
         Returns
         -------
@@ -245,10 +310,28 @@ class Study(Section):
             Reading a part that is not there raises `AttributeError`.
         """
         parts: dict[str, Any] = {}
+        single: dict[str, dict[str, Any]] = {}
         for name, value in values.items():
-            kind = cls.model_fields[name].annotation
-            if isinstance(kind, type) and issubclass(kind, Section):
+            section, _, key = name.partition(".")
+            kind = cls.model_fields[section].annotation
+            if key:
+                single.setdefault(section, {})[key] = value
+            elif isinstance(kind, type) and issubclass(kind, Section):
                 parts[name] = kind.model_validate(value)
             else:
                 parts[name] = value
+        for section, keys in single.items():
+            kind = cast("type[Section]", cls.model_fields[section].annotation)
+            parts[section] = kind.model_construct(**keys)
         return cls.model_construct(**parts)
+
+    def values(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return sections and single keys by name, as `part` takes them, in plain values."""
+        result: dict[str, Any] = {}
+        for name in names:
+            section, _, key = name.partition(".")
+            value = getattr(self, section)
+            if key:
+                value = getattr(value, key)
+            result[name] = value.model_dump(mode="json") if isinstance(value, Section) else value
+        return result

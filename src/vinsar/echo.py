@@ -126,7 +126,8 @@ def simulate(
         ),
     )
     logger.info("echo of %d facets at %d positions", len(position), channels * positions)
-    return variables.dataset("echo", {"echo": result}, {"frequency": frequency})
+    coords = {"channel": trajectory["channel"].values, "frequency": frequency}
+    return variables.dataset("echo", {"echo": result}, coords)
 
 
 def _simulate_block(
@@ -239,6 +240,5 @@ def add_noise(
     noise = np.stack(
         [rng.normal(size=(*samples.shape[1:], 2)).view(np.complex128)[..., 0] for rng in rngs]
     )
-    return variables.dataset(
-        "echo", {"echo": samples + np.sqrt(power / 2) * noise}, {"frequency": frequency}
-    )
+    coords = {"channel": echo["channel"].values, "frequency": frequency}
+    return variables.dataset("echo", {"echo": samples + np.sqrt(power / 2) * noise}, coords)

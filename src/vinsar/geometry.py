@@ -34,8 +34,10 @@ def grid_axis(minimum_m: float, maximum_m: float, spacing_m: float) -> Floats:
     Raises
     ------
     ValueError
-        If the extent is not a positive multiple of the spacing.
+        If the spacing is not positive, or the extent no positive multiple of it.
     """
+    if spacing_m <= 0:
+        raise ValueError(f"a spacing of {spacing_m} m is not positive")
     steps = (maximum_m - minimum_m) / spacing_m
     count = round(steps)
     if count < 1 or abs(steps - count) > 1e-6:

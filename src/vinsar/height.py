@@ -209,7 +209,7 @@ def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Data
     height = code_dem(image_height, x, y, antenna_y=float(lower[1]), antenna_height=float(lower[2]))
     unknown = int(np.isnan(height).sum())
     if unknown:
-        logger.warning("%d of %d cells of the DEM have no height", unknown, height.size)
+        logger.info("%d of %d cells of the DEM have no height", unknown, height.size)
     return variables.dataset(
         "dem",
         {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,7 +16,13 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+Interpolation = Literal["linear", "cubic"]
+
+# B-splines of degree 1 and 3 attenuate a frequency by sinc to these powers.
+_SINC_POWER: dict[str, int] = {"linear": 2, "cubic": 4}
+
 _ROWS_PER_BLOCK = 32
+_POSITIONS_PER_BLOCK = 128
 
 
 def compress(
@@ -26,12 +32,16 @@ def compress(
     far_range_m: float,
     window: radar.WindowName = "rectangular",
     oversampling: int = 16,
+    interpolation: Interpolation = "linear",
 ) -> xr.Dataset:
-    """Compress the echo in range, for back-projection by linear interpolation.
+    """Compress the echo in range, for back-projection by interpolation.
 
     The profile at slant range rho is ``sum_k w_k s_k exp(4 pi i (f_k - f_c) rho / c)`` with weights
-    of sum 1. Linear interpolation between its samples attenuates the band's edges by sinc^2; the
-    weights undo that, so only the spectral images of the interpolation remain as its error.
+    of sum 1. Interpolation between its samples attenuates the band's edges, linear by sinc^2 and
+    cubic (by B-splines) by sinc^4; the weights undo that, so only the spectral images of the
+    interpolation remain as its error. At oversampling m a full band has them at
+    ``2 (1 / 2m)^4 / 5`` of its power if linear, ``2 (1 / 2m)^8 / 9`` if cubic: -64 dB for linear at
+    16; -79, -93 and -103 dB for cubic at 4, 6 and 8.
 
     Parameters
     ----------
@@ -43,6 +53,8 @@ def compress(
         Weighting of the frequencies.
     oversampling
         Range samples per resolution cell ``c / 2W``, at least.
+    interpolation
+        What the profiles are weighted for; it goes with them as an attribute.
 
     Returns
     -------
@@ -70,23 +82,39 @@ def compress(
     length = fft.next_fast_len(count * oversampling)
     spacing = unambiguous / length
     offset = np.arange(count) - (count - 1) / 2
-    weights = radar.window(window, count) / np.sinc(offset / length) ** 2
+    attenuation = np.sinc(offset / length) ** _SINC_POWER[interpolation]
+    weights = (radar.window(window, count) / attenuation).astype(np.float32)
     # Two samples to spare on either side for the interpolation.
-    cells = np.arange(
-        int(np.floor(near_range_m / spacing)) - 2, int(np.ceil(far_range_m / spacing)) + 3
-    )
-    spectrum = echo["echo"].values * weights
-    profile = fft.ifft(spectrum, length, axis=-1, norm="forward")[..., cells % length]
+    first = int(np.floor(near_range_m / spacing)) - 2
+    cells = np.arange(first, int(np.ceil(far_range_m / spacing)) + 3)
     # The transform's phase runs from the first frequency; the carrier is the band's middle.
-    profile *= np.exp(-2j * np.pi * ((count - 1) / 2 * cells / length % 1))
-    return variables.dataset(
-        "profiles",
-        {
-            "profile": profile.astype(np.complex64),
-            "carrier_frequency": radar.carrier(frequency),
-        },
-        {"slant_range": spacing * cells},
+    turn = np.exp(-2j * np.pi * ((count - 1) / 2 * cells / length % 1)).astype(np.complex64)
+    samples = echo["echo"].values
+    channels, positions = samples.shape[:2]
+    profile = np.empty((channels, positions, cells.size), np.complex64)
+
+    def work(channel: int, begin: int) -> None:
+        part = channel, slice(begin, begin + _POSITIONS_PER_BLOCK)
+        # In single precision: its rounding, below -120 dB, is less than the interpolation's error.
+        spectrum = samples[part].astype(np.complex64) * weights
+        whole = fft.ifft(spectrum, length, axis=-1, norm="forward", overwrite_x=True)
+        np.multiply(np.take(whole, cells, axis=-1, mode="wrap"), turn, out=profile[part])
+
+    blocks.run(
+        work,
+        (
+            (channel, begin)
+            for channel in range(channels)
+            for begin in range(0, positions, _POSITIONS_PER_BLOCK)
+        ),
     )
+    result = variables.dataset(
+        "profiles",
+        {"profile": profile, "carrier_frequency": radar.carrier(frequency)},
+        {"channel": echo["channel"].values, "slant_range": spacing * cells},
+    )
+    result["profile"].attrs["interpolation"] = interpolation
+    return result
 
 
 def backproject(
@@ -99,6 +127,8 @@ def backproject(
     window: radar.WindowName = "rectangular",
 ) -> xr.Dataset:
     """Back-project the profiles onto a surface, by default the ground plane.
+
+    They are interpolated as they are weighted for (`compress`).
 
     ``I(p) = sum_l v_l P_l(rho_l) exp(4 pi i f_c rho_l / c)`` with the exact half path ``rho_l``
     from transmitter to pixel to receiver and weights of sum 1: a unit point target on the surface
@@ -138,25 +168,31 @@ def backproject(
             f"{transmitter.shape[:2]}"
         )
     slant_range = profiles["slant_range"].values
+    spacing = float(slant_range[-1] - slant_range[0]) / (slant_range.size - 1)
+    cubic = profiles["profile"].attrs.get("interpolation", "linear") == "cubic"
     near, far = trajectory.range_extent(trajectory_, x, y, z)
-    if near < slant_range[0] or far > slant_range[-1]:
+    # A cubic reads one sample more on either side.
+    spare = spacing if cubic else 0.0
+    if near < slant_range[0] + spare or far > slant_range[-1] - spare:
         raise ValueError(
             f"the profiles cover {slant_range[0]:.2f} to {slant_range[-1]:.2f} m of slant range, "
             f"but the grid needs {near:.2f} to {far:.2f} m"
         )
     weights = radar.window(window, samples.shape[1])
-    weighted = (samples * weights[:, None]).astype(np.complex64)
+    # Real and imaginary parts apart: so their samples fit into vector registers.
+    parts = np.zeros((2, *samples.shape[:2], slant_range.size + backprojection.PADDING), np.float32)
+    for part, values in zip(parts, (samples.real, samples.imag), strict=True):
+        part[..., : slant_range.size] = values * weights[:, None].astype(np.float32)
     surface = np.ascontiguousarray(np.broadcast_to(np.asarray(z, dtype=float), (y.size, x.size)))
     carrier = float(profiles["carrier_frequency"])
     image = np.zeros((samples.shape[0], y.size, x.size), dtype=np.complex64)
-    spacing = float(slant_range[-1] - slant_range[0]) / (slant_range.size - 1)
 
     def work(channel: int, begin: int) -> None:
         rows = slice(begin, begin + _ROWS_PER_BLOCK)
         backprojection.accumulate(
             image[channel, rows], x, y[rows], surface[rows], transmitter[channel],
-            receiver[channel], weighted[channel], float(slant_range[0]), spacing,
-            2 * carrier / SPEED_OF_LIGHT,
+            receiver[channel], parts[0, channel], parts[1, channel], float(slant_range[0]), spacing,
+            2 * carrier / SPEED_OF_LIGHT, cubic,
         )  # fmt: skip
 
     blocks.run(
@@ -175,5 +211,5 @@ def backproject(
             "wavelength": radar.wavelength(carrier),
             "phase_center": trajectory.phase_centers(trajectory_),
         },
-        {"x": x, "y": y},
+        {"channel": profiles["channel"].values, "x": x, "y": y},
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from vinsar import (
     accuracy,
@@ -21,6 +22,7 @@ from vinsar import (
     height,
     imaging,
     interferogram,
+    motion,
     radar,
     registration,
     scene,
@@ -29,11 +31,11 @@ from vinsar import (
     variables,
     visibility,
 )
+from vinsar.constants import CHANNELS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
-    import xarray as xr
     from numpy.typing import NDArray
 
     Floats = NDArray[np.floating]
@@ -43,7 +45,10 @@ logger = logging.getLogger(__name__)
 Products = dict[str, "xr.Dataset"]
 
 # What a random draw is for; the number is part of its seed and never changes.
-_JITTER, _NOISE = 0, 1
+_JITTER, _NOISE, _MOTION = 0, 1, 2
+
+# Slant range by which the profiles exceed the image: position errors shall not need new ones.
+_PROFILE_MARGIN_M = 0.5
 
 # Slant range around a point target that its image may need.
 _POINT_MARGIN_M = 1.5
@@ -60,19 +65,24 @@ class Stage:
     inputs
         Products that it reads.
     sections
-        Parts of the configuration that it reads, and no others.
+        Parts of the configuration that it reads, and no others: sections, or single keys such as
+        ``radar.frequency_count``.
     modules
         Modules whose code it runs, without those that they import.
+    by_channel
+        Whether each channel is computed from its own part of the inputs alone.
     """
 
     compute: Callable[[Products, config.Study], xr.Dataset]
     inputs: tuple[str, ...]
     sections: tuple[str, ...]
     modules: tuple[str, ...]
+    by_channel: bool = False
 
 
 def _rng(study: config.Study, *purpose: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(study.seed, spawn_key=purpose))
+    key = (study.realization, *purpose)
+    return np.random.default_rng(np.random.SeedSequence(study.seed, spawn_key=key))
 
 
 def _frequency(study: config.Study) -> Floats:
@@ -102,6 +112,32 @@ def _trajectory(products: Products, study: config.Study) -> xr.Dataset:
     )
 
 
+def _displaced(products: Products, study: config.Study, affected: str) -> xr.Dataset:
+    options = study.motion
+    if options.affects != affected or options.level_wavelengths == 0:
+        return products["trajectory"]
+
+    def draw(channel: int, positions: int) -> Floats:
+        return motion.errors(
+            positions,
+            std_m=options.level_wavelengths * radar.wavelength(radar.carrier(_frequency(study))),
+            distribution=options.distribution,
+            spectrum=options.spectrum,
+            cycles_per_aperture=options.cycles_per_aperture,
+            rng=_rng(study, _MOTION, channel if options.channels == "independent" else 0),
+        )
+
+    return motion.displace(products["trajectory"], axis=options.axis, draw=draw)
+
+
+def _true_trajectory(products: Products, study: config.Study) -> xr.Dataset:
+    return _displaced(products, study, "true")
+
+
+def _recorded_trajectory(products: Products, study: config.Study) -> xr.Dataset:
+    return _displaced(products, study, "recorded")
+
+
 def _terrain(products: Products, study: config.Study) -> xr.Dataset:
     del products
     return scene.terrain(
@@ -128,7 +164,7 @@ def _facets(products: Products, study: config.Study) -> xr.Dataset:
 def _visibility(products: Products, study: config.Study) -> xr.Dataset:
     del study
     return visibility.facet_visibility(
-        products["terrain"], products["facets"], products["trajectory"]
+        products["terrain"], products["facets"], products["true_trajectory"]
     )
 
 
@@ -138,27 +174,31 @@ def _truth(products: Products, study: config.Study) -> xr.Dataset:
 
 
 def _echo(products: Products, study: config.Study) -> xr.Dataset:
-    options = study.echo
-    facets, antennas = products["facets"], products["trajectory"]
-    result = echo.simulate(
-        facets,
-        antennas,
-        products["visibility"] if options.occlusion else None,
+    return echo.simulate(
+        products["facets"],
+        products["true_trajectory"],
+        products["visibility"] if study.echo.occlusion else None,
         frequency=_frequency(study),
-        reflectivity=options.reflectivity,
-        spreading=options.spreading,
-        accuracy_db=options.accuracy_db,
+        reflectivity=study.echo.reflectivity,
+        spreading=study.echo.spreading,
+        accuracy_db=study.echo.accuracy_db,
     )
-    if options.snr_db is None:
-        return result
+
+
+def _received(products: Products, study: config.Study) -> xr.Dataset:
+    if study.echo.snr_db is None:
+        return products["echo"]
+    facets = products["facets"]
     near, far = trajectory.range_extent(
-        antennas, *_facet_extent(facets), facets["facet_position"].values[:, 2]
+        products["true_trajectory"],
+        *_facet_extent(facets),
+        facets["facet_position"].values[:, 2],
     )
     return echo.add_noise(
-        result,
-        snr_db=options.snr_db,
+        products["echo"],
+        snr_db=study.echo.snr_db,
         swath_m=far - near,
-        rngs=[_rng(study, _NOISE, channel) for channel in range(result.sizes["channel"])],
+        rngs=[_rng(study, _NOISE, channel) for channel in range(products["echo"].sizes["channel"])],
     )
 
 
@@ -171,9 +211,9 @@ def _facet_extent(facets: xr.Dataset) -> tuple[Floats, Floats]:
 def _profiles(products: Products, study: config.Study) -> xr.Dataset:
     near, far = trajectory.range_extent(products["trajectory"], *image_axes(study.imaging))
     return imaging.compress(
-        products["echo"],
-        near_range_m=near,
-        far_range_m=far,
+        products["received"],
+        near_range_m=max(0.0, near - _PROFILE_MARGIN_M),
+        far_range_m=far + _PROFILE_MARGIN_M,
         window=study.imaging.range_window,
         oversampling=study.imaging.oversampling,
     )
@@ -183,7 +223,7 @@ def _images(products: Products, study: config.Study) -> xr.Dataset:
     x, y = image_axes(study.imaging)
     return imaging.backproject(
         products["profiles"],
-        products["trajectory"],
+        products["recorded_trajectory"],
         x=x,
         y=y,
         window=study.imaging.aperture_window,
@@ -252,6 +292,21 @@ def _accuracy(products: Products, study: config.Study) -> xr.Dataset:
     )
 
 
+def _focus(products: Products, study: config.Study) -> xr.Dataset:
+    truth, recorded = products["true_trajectory"], products["recorded_trajectory"]
+    frequency = _frequency(study)
+    x, y = image_axes(study.imaging)
+    gain = motion.point_gain(
+        truth,
+        recorded,
+        np.array([(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2, 0.0]),
+        frequency,
+        radar.window(study.imaging.range_window, frequency.size),
+        radar.window(study.imaging.aperture_window, truth.sizes["position"]),
+    )
+    return variables.dataset("focus", {"point_gain": gain})
+
+
 def _registration(products: Products, study: config.Study) -> xr.Dataset:
     antennas = products["trajectory"]
     frequency = _frequency(study)
@@ -295,38 +350,115 @@ def _registration(products: Products, study: config.Study) -> xr.Dataset:
     )
 
 
+_WAVEFORM = ("radar.start_frequency_hz", "radar.stop_frequency_hz", "radar.frequency_count")
+_ANTENNAS = (
+    "radar.system",
+    "radar.aperture_length_m",
+    "radar.position_spacing_m",
+    "radar.rail_height_m",
+    "radar.baseline_m",
+    "radar.baseline_angle_deg",
+)
+_DRAWS = ("seed", "realization")
+_GRID = (
+    "imaging.x_min_m",
+    "imaging.x_max_m",
+    "imaging.y_min_m",
+    "imaging.y_max_m",
+    "imaging.grid_spacing_m",
+)
+
 STAGES: dict[str, Stage] = {
-    "trajectory": Stage(_trajectory, (), ("radar",), ("trajectory",)),
     "terrain": Stage(_terrain, (), ("scene",), ("scene",)),
-    "facets": Stage(_facets, ("terrain",), ("seed", "scene"), ("scene",)),
-    "visibility": Stage(_visibility, ("terrain", "facets", "trajectory"), (), ("visibility",)),
-    "truth": Stage(_truth, ("terrain", "trajectory"), ("imaging",), ("visibility",)),
+    "facets": Stage(
+        _facets,
+        ("terrain",),
+        (*_DRAWS, "scene.facet_size_m", "scene.facet_jitter"),
+        ("scene",),
+    ),
+    "trajectory": Stage(_trajectory, (), _ANTENNAS, ("trajectory",)),
+    "true_trajectory": Stage(
+        _true_trajectory, ("trajectory",), (*_DRAWS, *_WAVEFORM, "motion"), ("motion", "radar")
+    ),
+    "visibility": Stage(
+        _visibility,
+        ("terrain", "facets", "true_trajectory"),
+        (),
+        ("visibility",),
+        by_channel=True,
+    ),
+    "truth": Stage(_truth, ("terrain", "trajectory"), _GRID, ("visibility",)),
     "echo": Stage(
         _echo,
-        ("facets", "trajectory", "visibility"),
-        ("seed", "radar", "echo"),
+        ("facets", "true_trajectory", "visibility"),
+        (
+            *_WAVEFORM,
+            "echo.reflectivity",
+            "echo.occlusion",
+            "echo.spreading",
+            "echo.accuracy_db",
+        ),
+        ("echo",),
+        by_channel=True,
+    ),
+    "received": Stage(
+        _received,
+        ("echo", "facets", "true_trajectory"),
+        (*_DRAWS, "echo.snr_db"),
         ("echo", "trajectory"),
     ),
-    "profiles": Stage(_profiles, ("echo", "trajectory"), ("imaging",), ("imaging",)),
-    "images": Stage(_images, ("profiles", "trajectory"), ("imaging",), ("imaging",)),
+    "profiles": Stage(
+        _profiles,
+        ("received", "trajectory"),
+        (*_GRID, "imaging.range_window", "imaging.oversampling"),
+        ("imaging", "trajectory"),
+    ),
+    "recorded_trajectory": Stage(
+        _recorded_trajectory, ("trajectory",), (*_DRAWS, *_WAVEFORM, "motion"), ("motion", "radar")
+    ),
+    "images": Stage(
+        _images,
+        ("profiles", "recorded_trajectory"),
+        (*_GRID, "imaging.aperture_window"),
+        ("imaging",),
+        by_channel=True,
+    ),
     "interferogram": Stage(_interferogram, ("images",), ("interferogram",), ("interferogram",)),
     "filtered": Stage(_filtered, ("interferogram",), ("filtering",), ("filtering",)),
     "unwrapped": Stage(
         _unwrapped,
         ("filtered", "interferogram"),
-        ("radar", "imaging", "interferogram", "unwrapping"),
+        (
+            *_WAVEFORM,
+            *_GRID,
+            "radar.rail_height_m",
+            "radar.aperture_length_m",
+            "interferogram",
+            "unwrapping",
+        ),
         ("unwrapping", "radar"),
     ),
     "dem": Stage(_dem, ("unwrapped", "images"), ("height",), ("height",)),
     "accuracy": Stage(_accuracy, ("dem", "truth"), ("accuracy",), ("accuracy",)),
+    "focus": Stage(
+        _focus,
+        ("true_trajectory", "recorded_trajectory"),
+        (*_WAVEFORM, *_GRID, "imaging.range_window", "imaging.aperture_window"),
+        ("motion", "radar"),
+    ),
     "registration": Stage(
         _registration,
         ("trajectory",),
-        ("radar", "imaging", "registration"),
+        (
+            *_WAVEFORM,
+            "radar.aperture_length_m",
+            "imaging",
+            "registration",
+        ),
         ("registration", "echo", "imaging"),
     ),
 }
-"""The chain in order; a stage makes the product of its name."""
+"""The chain; a stage makes the product of its name. What sweeps change least comes first."""
 
 
 def run_stage(name: str, products: Mapping[str, xr.Dataset], study: config.Study) -> xr.Dataset:
@@ -348,8 +480,37 @@ def run_stage(name: str, products: Mapping[str, xr.Dataset], study: config.Study
     """
     stage = STAGES[name]
     logger.info("stage %s", name)
-    part = study.part({section: getattr(study, section) for section in stage.sections})
-    return stage.compute({key: products[key] for key in stage.inputs}, part)
+    part = study.part(study.values(stage.sections))
+    inputs = {key: products[key] for key in stage.inputs}
+    if not stage.by_channel:
+        return stage.compute(inputs, part)
+    return join_channels(
+        [stage.compute(split_channel(inputs, channel), part) for channel in CHANNELS]
+    )
+
+
+def split_channel(products: Mapping[str, xr.Dataset], channel: str) -> Products:
+    """Return one channel's part of each product."""
+    index = [CHANNELS.index(channel)]
+    return {
+        name: product.isel(channel=index) if "channel" in product.dims else product
+        for name, product in products.items()
+    }
+
+
+def join_channels(parts: list[xr.Dataset]) -> xr.Dataset:
+    """Return one product from its channels' parts; what has no channel is the first part's."""
+    first = parts[0]
+    joined = {}
+    for name, values in first.variables.items():
+        if "channel" in values.dims:
+            pieces = [part.variables[name].values for part in parts]
+            axis = values.dims.index("channel")
+            joined[name] = (values.dims, np.concatenate(pieces, axis=axis), values.attrs)
+        else:
+            joined[name] = (values.dims, values.values, values.attrs)
+    coords = {name: joined.pop(name) for name in first.coords}
+    return xr.Dataset(joined, coords)
 
 
 def run(study: config.Study, only: str | None = None) -> Products:
@@ -372,13 +533,17 @@ def run(study: config.Study, only: str | None = None) -> Products:
     KeyError
         If there is no such product.
     """
-    wanted = set(STAGES) if only is None else _needed(only)
     products: Products = {}
-    for name in STAGES:
-        if name in wanted:
-            products[name] = run_stage(name, products, study)
+    for name in STAGES if only is None else needed([only]):
+        products[name] = run_stage(name, products, study)
     return products
 
 
 def _needed(product: str) -> set[str]:
     return {product}.union(*(_needed(name) for name in STAGES[product].inputs))
+
+
+def needed(products: Iterable[str]) -> dict[str, Stage]:
+    """Return the stages that some products need, their own included, in order."""
+    wanted = set().union(*(_needed(name) for name in products))
+    return {name: stage for name, stage in STAGES.items() if name in wanted}

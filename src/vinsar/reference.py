@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from vinsar import config
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from pydantic.fields import FieldInfo
 
@@ -48,22 +48,23 @@ def markdown(defaults: Mapping[str, Any]) -> str:
     str
         A table a section, in Markdown.
     """
-    plain = [(n, f) for n, f in config.Study.model_fields.items() if _model(f.annotation) is None]
-    parts = [_HEAD, "## Study\n", _table(plain, defaults)]
-    for name, field in config.Study.model_fields.items():
-        model = _model(field.annotation)
-        if model is not None:
-            parts += [f"## `{name}`\n", f"{model.__doc__}\n", _section(model, defaults[name])]
+    fields = config.Study.model_fields
+    plain = [(name, field) for name, field in fields.items() if not _is_model(field.annotation)]
+    parts = [_HEAD, "## Study\n", _section(plain, defaults)]
+    for name, field in fields.items():
+        if _is_model(field.annotation):
+            model = typing.cast("type[BaseModel]", field.annotation)
+            rows = list(model.model_fields.items())
+            parts += [f"## `{name}`\n", f"{model.__doc__}\n", _section(rows, defaults[name])]
     return "\n".join(parts)
 
 
-def _section(model: type[BaseModel], defaults: Mapping[str, Any]) -> str:
-    text = _table(list(model.model_fields.items()), defaults)
-    nested = {_model(f.annotation) for f in model.model_fields.values()}
-    for inner in sorted((m for m in nested if m is not None), key=lambda m: m.__name__):
-        text += f"\n{inner.__name__}: {inner.__doc__}\n\n" + _table(
-            list(inner.model_fields.items()), None
-        )
+def _section(fields: list[tuple[str, FieldInfo]], defaults: Mapping[str, Any]) -> str:
+    text = _table(fields, defaults)
+    inner = {model for _, field in fields for model in _inner_models(field.annotation)}
+    for model in sorted(inner, key=lambda model: model.__name__):
+        rows = list(model.model_fields.items())
+        text += f"\n{model.__name__}: {model.__doc__}\n\n" + _table(rows, None)
     return text
 
 
@@ -89,17 +90,19 @@ def _value(value: Any) -> str:
 
 
 def _allowed(field: FieldInfo) -> str:
-    model = _model(field.annotation)
-    if model is not None:
-        many = typing.get_origin(field.annotation) is tuple
-        return f"list of {model.__name__}" if many else model.__name__
-    if typing.get_origin(field.annotation) is dict:
-        return "keys of a study, by name"
-    options = typing.get_args(field.annotation)
-    if typing.get_origin(field.annotation) is typing.Literal:
+    annotation = field.annotation
+    options = typing.get_args(annotation)
+    inner = _inner_models(annotation)
+    if inner or _is_model(annotation):
+        name = inner[0].__name__ if inner else getattr(annotation, "__name__", "")
+        many: dict[Any, str] = {tuple: "list of ", dict: "by name: "}
+        return many.get(typing.get_origin(annotation), "") + name
+    if typing.get_origin(annotation) is dict:
+        return "keys of a study" if options[1] is Any else "by name"
+    if typing.get_origin(annotation) is typing.Literal:
         return ", ".join(f"`{option}`" for option in options)
     kind = {float: "number", int: "whole number", bool: "`true`, `false`", str: "text"}
-    words = [kind[t] for t in (options or (field.annotation,)) if t in kind]
+    words = [kind[t] for t in (options or (annotation,)) if t in kind]
     bounds = [
         f"{sign} {getattr(item, name):g}"
         for item in field.metadata
@@ -108,19 +111,16 @@ def _allowed(field: FieldInfo) -> str:
     ]
     if type(None) in options:
         bounds.append("or null")
-    return " ".join([words[0], *bounds])
+    return " ".join([*words, *bounds])
 
 
-def _model(annotation: Any) -> type[BaseModel] | None:
-    for kind in _kinds(annotation):
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            return kind
-    return None
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
-def _kinds(annotation: Any) -> Iterator[Any]:
-    yield annotation
-    yield from typing.get_args(annotation)
+def _inner_models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models that a list or mapping holds."""
+    return [kind for kind in typing.get_args(annotation) if _is_model(kind)]
 
 
 def schema() -> str:

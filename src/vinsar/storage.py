@@ -154,7 +154,7 @@ def read(path: str | Path, product: str) -> xr.Dataset:
 
 def _restore(stored: xr.Dataset, product: str) -> xr.Dataset:
     data = stored.copy()
-    for name, variable in variables.PRODUCTS[product].items():
+    for name, variable in variables.PRODUCTS.get(product, {}).items():
         if variable.kind == "complex":
             real, imag = (stored[f"{name}_{part}"] for part in _PARTS)
             values = np.empty(real.shape, np.result_type(real.dtype, np.complex64))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from functools import cache
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -44,9 +46,20 @@ def residues(phase: Floats) -> NDArray[np.int8]:
     return result
 
 
+@cache
+def _single_thread() -> None:
+    """Keep whirlwind to one thread: parallelism is Dask's."""
+    import whirlwind
+
+    # It refuses if another library or the user has decided before.
+    with suppress(RuntimeError):
+        whirlwind.set_num_threads(1)
+
+
 def _whirlwind(values: Complexes, coherence: Floats, looks: float) -> Floats:
     import whirlwind
 
+    _single_thread()
     # Low coherence rather than a mask: a mask would split the scene into pieces of unknown level.
     unwrapped, _ = whirlwind.unwrap(
         np.ascontiguousarray(values, np.complex64),
@@ -132,8 +145,9 @@ def unwrap(
     wrapped = np.angle(values).astype(float)
     unwrapped = _UNWRAPPERS[method](values, coherence.values, looks).astype(float)
     # Solvers work in single precision and from any level: keep only their whole cycles.
-    level = np.median(unwrapped - wrapped)
-    cycles = np.rint((unwrapped - wrapped - level) / (2 * np.pi))
+    added = unwrapped - wrapped
+    level = np.angle(np.exp(1j * added).mean())
+    cycles = np.rint((added - level) / (2 * np.pi))
     return variables.dataset(
         "unwrapped",
         {"phase": wrapped + 2 * np.pi * cycles, "residue": residues(wrapped)},

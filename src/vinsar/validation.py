@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import itertools
 import re
 import typing
 from dataclasses import dataclass
@@ -185,6 +186,53 @@ def variants(study: config.Study) -> dict[str, config.Study]:
     if faults:
         raise ConfigurationError(faults)
     return found
+
+
+def sweep_studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config.Study]]:
+    """Return the studies of a sweep, all checked: the product of its lists, the last fastest.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+
+    Returns
+    -------
+    list of tuple
+        Swept keys with their values, and the study that they make.
+
+    Raises
+    ------
+    ConfigurationError
+        If anything is wrong with one of them.
+    """
+    sweep = study.sweeps[name]
+    base = merge(study.model_dump(mode="json"), sweep.base) | {"variants": {}, "sweeps": {}}
+    found: list[tuple[dict[str, Any], config.Study]] = []
+    faults: dict[tuple[str, str, str], Fault] = {}
+    for values in itertools.product(*sweep.over.values()):
+        changes = dict(zip(sweep.over, values, strict=True))
+        raw: dict[str, Any] = base
+        for key, value in changes.items():
+            raw = merge(raw, _nested(key, value))
+        try:
+            found.append((changes, check(raw)))
+        except ConfigurationError as error:
+            for fault in error.faults:
+                # A fault that many cases share is told once, with the first of them.
+                where = f"sweeps.{name} at {changes}: {fault.key}"
+                first = Fault(where, fault.value, fault.allowed)
+                faults.setdefault((fault.key, str(fault.value), fault.allowed), first)
+    if faults:
+        raise ConfigurationError(faults.values())
+    return found
+
+
+def _nested(key: str, value: Any) -> dict[str, Any]:
+    section, _, rest = key.partition(".")
+    return {section: _nested(rest, value) if rest else value}
 
 
 def advice(study: config.Study) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
-from vinsar.constants import AXES, CHANNELS
+from vinsar.constants import AXES, CHANNELS, REGIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -91,16 +91,30 @@ COORDINATES: dict[str, Variable] = {
     "target": Variable(("target",), "label", "", "point target"),
     "target_height": Variable(("target_height",), "real", "m", "height of the point target"),
     "region": Variable(("region",), "label", "", "part of the scene"),
+    "realization": Variable(("realization",), "integer", "1", "number of the realization"),
 }
 
 _ANTENNA = ("channel", "position", "axis")
 _SHIFT = ("ground_axis", "target", "target_height")
 
+_ANTENNAS = {
+    "transmitter": Variable(_ANTENNA, "real", "m", "position of the transmitting antenna"),
+    "receiver": Variable(_ANTENNA, "real", "m", "position of the receiving antenna"),
+}
+_ECHO = {
+    "echo": Variable(
+        ("channel", "position", "frequency"),
+        "complex",
+        "1",
+        "stepped-frequency echo",
+        "a path R out and back gives the phase -2 pi f R / c",
+    ),
+}
+
 PRODUCTS: dict[str, dict[str, Variable]] = {
-    "trajectory": {
-        "transmitter": Variable(_ANTENNA, "real", "m", "position of the transmitting antenna"),
-        "receiver": Variable(_ANTENNA, "real", "m", "position of the receiving antenna"),
-    },
+    "trajectory": _ANTENNAS,
+    "true_trajectory": _ANTENNAS,
+    "recorded_trajectory": _ANTENNAS,
     "terrain": {
         "height": Variable(_GRID, "real", "m", "true height above the ground plane"),
         "reflectivity": Variable(_GRID, "real", "1", "reflectivity of the scene"),
@@ -132,15 +146,8 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
             flag_meanings="visible shadow",
         ),
     },
-    "echo": {
-        "echo": Variable(
-            ("channel", "position", "frequency"),
-            "complex",
-            "1",
-            "stepped-frequency echo",
-            "a path R out and back gives the phase -2 pi f R / c",
-        ),
-    },
+    "echo": _ECHO,
+    "received": _ECHO,
     "profiles": {
         "profile": Variable(
             ("channel", "position", "slant_range"),
@@ -204,6 +211,14 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
         ),
         "phase_offset": Variable(
             _GRID, "real", "radian", "phase added to fit the reference heights"
+        ),
+    },
+    "focus": {
+        "point_gain": Variable(
+            ("channel",),
+            "real",
+            "1",
+            "amplitude of a point target at the image's centre relative to perfect focus",
         ),
     },
     "accuracy": {
@@ -286,6 +301,17 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
     },
 }
 
+SWEEP: dict[str, Variable] = {
+    name: variable
+    for name, variable in PRODUCTS["accuracy"].items()
+    if variable.dims == ("region",) and name != "cell_count"
+} | {
+    "coherence": Variable((), "real", "1", "median coherence on visible ground"),
+    "residues": Variable((), "integer", "1", "residues of the filtered phase"),
+    "point_gain": PRODUCTS["focus"]["point_gain"],
+}
+"""Variables of a sweep; the dimensions of the swept keys and of the realization come first."""
+
 LABELS: dict[str, tuple[str, ...]] = {"channel": CHANNELS, "axis": AXES, "ground_axis": AXES[:2]}
 
 
@@ -314,7 +340,8 @@ def dataset(
         If a variable is missing, undeclared, or of other shape or type than declared.
     """
     declared = PRODUCTS[product]
-    result = xr.Dataset()
+    contents: dict[str, Any] = {}
+    sizes: dict[str, int] = {}
     for name, values in data.items():
         if name not in declared:
             raise ValueError(f"product '{product}' has no variable '{name}'")
@@ -325,17 +352,51 @@ def dataset(
                 f"'{name}' of product '{product}' has {array.ndim} dimensions, "
                 f"but {dims} are declared"
             )
-        result[name] = (dims, array, declared[name].attrs)
-    coords = dict(coords or {})
-    for dim in result.dims:
-        name = str(dim)
-        if name not in coords:
-            coords[name] = LABELS[name] if name in LABELS else np.arange(result.sizes[dim])
-    # A dataset written twice is the same bytes only if its coordinates come in one order.
-    for name in sorted(set(coords) & {str(dim) for dim in result.dims}):
-        result = result.assign_coords({name: (name, np.asarray(coords[name]))})
-        result[name].attrs = COORDINATES[name].attrs
+        contents[name] = (dims, array, declared[name].attrs)
+        sizes |= dict(zip(dims, array.shape, strict=True))
+    labels: dict[str, Any] = {}
+    # In one order, so that a dataset written twice is the same bytes.
+    for name in sorted(sizes):
+        if coords is not None and name in coords:
+            values = np.asarray(coords[name])
+        else:
+            values = np.asarray(LABELS[name] if name in LABELS else np.arange(sizes[name]))
+        labels[name] = (name, values, COORDINATES[name].attrs)
+    result = xr.Dataset(contents, labels)
     check(result, product)
+    return result
+
+
+def sweep_dataset(
+    data: Mapping[str, Any], swept: Mapping[str, tuple[Any, dict[str, str]]]
+) -> xr.Dataset:
+    """Make a sweep's product.
+
+    Parameters
+    ----------
+    data
+        An array for each variable of `SWEEP`: swept keys, realization, then its own dimensions.
+    swept
+        Values and attributes of each swept key's dimension, in order.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``sweep``.
+    """
+    result = xr.Dataset()
+    leading = (*swept, "realization")
+    for name, values in data.items():
+        result[name] = ((*leading, *SWEEP[name].dims), values, SWEEP[name].attrs)
+    for name, (labels, attrs) in swept.items():
+        result = result.assign_coords({name: (name, labels, attrs)})
+    coords = {
+        "realization": np.arange(result.sizes["realization"]),
+        "region": np.array(REGIONS),
+        "channel": np.array(CHANNELS),
+    }
+    for name, labels in coords.items():
+        result = result.assign_coords({name: (name, labels, COORDINATES[name].attrs)})
     return result
 
 
@@ -355,6 +416,9 @@ def check(data: xr.Dataset, product: str) -> None:
         Names the first variable that is missing, undeclared, or departs in dimensions, type or
         attributes, with what is declared.
     """
+    if product == "sweep":
+        _check_sweep(data)
+        return
     declared = PRODUCTS[product]
     dims = {dim for variable in declared.values() for dim in variable.dims}
     expected = declared | {dim: COORDINATES[dim] for dim in dims}
@@ -364,7 +428,7 @@ def check(data: xr.Dataset, product: str) -> None:
     for name in sorted(found - set(expected)):
         raise ValueError(f"product '{product}' has no variable '{name}'")
     for name, variable in expected.items():
-        array = data[name]
+        array = data.variables[name]
         if array.dims != variable.dims:
             raise ValueError(
                 f"'{name}' of product '{product}' has the dimensions {array.dims}, "
@@ -381,4 +445,24 @@ def check(data: xr.Dataset, product: str) -> None:
                 raise ValueError(
                     f"'{name}' of product '{product}' has {attribute}="
                     f"{array.attrs.get(attribute)!r}, but {value!r} is declared"
+                )
+
+
+def _check_sweep(data: xr.Dataset) -> None:
+    found = {str(name) for name in data.data_vars}
+    if found != set(SWEEP):
+        raise ValueError(f"product 'sweep' holds {sorted(found)}, but {sorted(SWEEP)} are declared")
+    for name, variable in SWEEP.items():
+        dims = data[name].dims
+        own = len(variable.dims)
+        if dims[len(dims) - own :] != variable.dims or "realization" not in dims:
+            raise ValueError(
+                f"'{name}' of product 'sweep' has the dimensions {dims}, but the swept keys, "
+                f"realization and {variable.dims} are declared"
+            )
+        for attribute, value in variable.attrs.items():
+            if data[name].attrs.get(attribute) != value:
+                raise ValueError(
+                    f"'{name}' of product 'sweep' has {attribute}="
+                    f"{data[name].attrs.get(attribute)!r}, but {value!r} is declared"
                 )

@@ -108,7 +108,9 @@ def facet_visibility(terrain: xr.Dataset, facets: xr.Dataset, trajectory: xr.Dat
     """
     points = facets["facet_position"].values
     return variables.dataset(
-        "visibility", {"visible": channel_visibility(terrain, trajectory, points)}
+        "visibility",
+        {"visible": channel_visibility(terrain, trajectory, points)},
+        {"channel": trajectory["channel"].values},
     )
 
 

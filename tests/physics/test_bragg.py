@@ -58,9 +58,7 @@ def test_without_jitter_the_echoes_of_all_facets_add_up_at_resonance(strip, ante
 def test_with_full_jitter_the_resonance_is_gone_and_speckle_is_left(strip, antenna, resonance):
     seeds = 200
     frequency = resonance + np.array([0.0, 1e6])
-    signal = np.array(
-        [returns(strip, antenna, frequency, 1.0, seed)[0] for seed in range(seeds)]
-    )
+    signal = np.array([returns(strip, antenna, frequency, 1.0, seed)[0] for seed in range(seeds)])
     # The jitter's characteristic function is sinc(3) = 0, so the expected sum is zero: the mean of
     # K sums has the mean power N / K, exponentially distributed (exp(-12) = 6e-6).
     assert np.abs(signal.mean()) ** 2 < 12 * COUNT / seeds
@@ -71,14 +69,10 @@ def test_with_full_jitter_the_resonance_is_gone_and_speckle_is_left(strip, anten
     assert power.std() / power.mean() == pytest.approx(1, abs=4 * np.sqrt(2 / seeds))
 
 
-def test_half_a_jitter_leaves_the_resonance_its_characteristic_function(
-    strip, antenna, resonance
-):
+def test_half_a_jitter_leaves_the_resonance_its_characteristic_function(strip, antenna, resonance):
     seeds = 100
     frequency = resonance + np.array([0.0, 1e6])
-    mean = np.mean(
-        [returns(strip, antenna, frequency, 0.5, seed)[0] for seed in range(seeds)]
-    )
+    mean = np.mean([returns(strip, antenna, frequency, 0.5, seed)[0] for seed in range(seeds)])
     # sinc(3 / 2) = -0.212 of each facet's echo stays coherent; the rest averages out.
     expected = COUNT * np.sinc(1.5)
     assert np.abs(mean) == pytest.approx(np.abs(expected), abs=3.5 * np.sqrt(COUNT / seeds))

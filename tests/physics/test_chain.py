@@ -113,7 +113,7 @@ def test_level_ground_has_the_phase_noise_of_its_coherence_around_zero(level, th
     phase = np.angle(lower * np.conj(upper))
     cells = resolution_cells()
     assert abs(phase.mean()) < 4 * theory.phase / np.sqrt(cells)
-    # The fourth moment of single-look phases is some 15 times the squared variance:
+    # The fourth moment of single-look phases is 14 times the squared variance:
     # relative scatter of the variance sqrt(14 / N), of the deviation half of it; three of them.
     assert phase.std() == pytest.approx(theory.phase, rel=1.5 * np.sqrt(14 / cells))
 

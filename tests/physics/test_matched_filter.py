@@ -91,9 +91,7 @@ def test_linear_interpolation_at_16_times_is_minus_64_db_for_a_full_band():
 
 @pytest.mark.parametrize("window", ["rectangular", "hamming"])
 def test_a_point_target_errs_nowhere_by_more_than_its_bound(scatterers, rail, window):
-    signal = echo.simulate(
-        scatterers([0.1, 6.0, 0.0]), rail, frequency=FREQUENCY, accuracy_db=None
-    )
+    signal = echo.simulate(scatterers([0.1, 6.0, 0.0]), rail, frequency=FREQUENCY, accuracy_db=None)
     profiles = profiles_of(signal, rail, X, Y, 0.0, window, 16)
     found = imaging.backproject(profiles, rail, x=X, y=Y, window=window)["image"].values
     exact = matched_filter(signal, rail, X, Y, 0.0, window)

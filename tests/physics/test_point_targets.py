@@ -104,8 +104,6 @@ def test_minus_3_db_widths_are_those_of_band_and_aperture(focus, rail, scatterer
 def test_first_sidelobe_of_the_rectangular_window_is_minus_13_db(focus, rail, scatterers):
     cell = LIGHT / (2 * 201 * 10e6)
     slant = np.hypot(10.0, 2.0) + np.linspace(1.0, 2.0, 101) * cell
-    images = focus(
-        scatterers((0, 10, 0)), rail, FREQUENCY, np.array([0.0]), np.sqrt(slant**2 - 4)
-    )
+    images = focus(scatterers((0, 10, 0)), rail, FREQUENCY, np.array([0.0]), np.sqrt(slant**2 - 4))
     level = 20 * np.log10(np.abs(images["image"].values[0, :, 0]).max())
     assert level == pytest.approx(-13.26, abs=0.1)

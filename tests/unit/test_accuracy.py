@@ -66,9 +66,7 @@ def test_where_there_is_nothing_to_count_statistics_are_nan(error):
     found = accuracy.statistics(error, 0.05)
     assert np.isnan([found["mean"], found["std"], found["maximum_absolute"]]).all()
     assert found["cell_count"] == error.size
-    np.testing.assert_equal(
-        found["fraction_reconstructed"], 0.0 if error.size else np.nan
-    )
+    np.testing.assert_equal(found["fraction_reconstructed"], 0.0 if error.size else np.nan)
 
 
 @pytest.fixture
@@ -77,7 +75,9 @@ def scored():
     shadow = np.array([[False, True, True, False], [False, False, False, False]])
     error = np.array([[0.01, 0.30, np.nan, 9.0], [-0.01, np.nan, 0.06, 9.0]])
     return accuracy.evaluate(
-        dem(np.where(np.isnan(height), 9.0, height + error)), truth(height, shadow), tolerance_m=0.05
+        dem(np.where(np.isnan(height), 9.0, height + error)),
+        truth(height, shadow),
+        tolerance_m=0.05,
     )
 
 
@@ -98,13 +98,13 @@ def test_regions_split_the_scene_by_shadow_and_leave_out_what_is_beyond(scored):
 
 def test_grids_that_differ_are_refused():
     small = truth(np.zeros((2, 4)), np.zeros((2, 4), bool)).isel(x=slice(3))
-    with pytest.raises(ValueError, match=r"a DEM of \(2, 4\) .* a truth of \(2, 3\)"):
+    with pytest.raises(ValueError, match=r"x runs from 0 to 3 m in 4 cells, .* in 3"):
         accuracy.evaluate(dem(np.zeros((2, 4))), small, tolerance_m=0.05)
 
 
 def test_grids_of_one_shape_at_other_places_are_refused():
     moved = truth(np.zeros((2, 4)), np.zeros((2, 4), bool)).assign_coords(x=np.arange(4.0) + 1)
-    with pytest.raises(ValueError, match="DEM|grid"):
+    with pytest.raises(ValueError, match=r"DEM|grid"):
         accuracy.evaluate(dem(np.zeros((2, 4))), moved, tolerance_m=0.05)
 
 

@@ -47,6 +47,21 @@ def test_the_configured_scheduler_is_used():
         assert blocks.run(threading.current_thread, [()]) == [threading.current_thread()]
 
 
+def test_work_that_is_itself_run_in_parallel_runs_its_blocks_serially():
+    def threads():
+        return set(blocks.run(threading.current_thread, [()] * 8))
+
+    with blocks.serially():
+        assert threads() == {threading.current_thread()}
+    assert threading.current_thread() not in threads()
+
+
+def test_blocks_are_parallel_again_after_an_error_in_serial_work():
+    with pytest.raises(ZeroDivisionError), blocks.serially():
+        blocks.run(lambda: 1 / 0, [()])
+    assert blocks.run(threading.current_thread, [()]) != [threading.current_thread()]
+
+
 def test_an_error_in_the_work_comes_out():
     with pytest.raises(ZeroDivisionError):
         blocks.run(lambda value: 1 / value, [(1,), (0,)])

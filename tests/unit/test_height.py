@@ -102,9 +102,7 @@ def test_control_points_on_a_hill_fix_the_constant(ideal_phase, trend):
     np.testing.assert_allclose(offset, 7.0, atol=0.05)
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "z"), [(2.0, 9.0, 0.0), (0.0, 12.0, 0.0), (0.0, 8.05, 0.5)]
-)
+@pytest.mark.parametrize(("x", "y", "z"), [(2.0, 9.0, 0.0), (0.0, 12.0, 0.0), (0.0, 8.05, 0.5)])
 def test_a_point_imaged_outside_the_grid_is_refused(ideal_phase, x, y, z):
     # The last one lies inside, but its height brings it nearer by 11 cm.
     unwrapped, images = ideal_phase(flat, X, Y)
@@ -120,7 +118,7 @@ def code(image_height, y, antenna_height=2.0, antenna_y=0.0):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("antenna_y", [0.0, 0.4])
+@pytest.mark.parametrize("antenna_y", [0.0, 3.0])
 def test_dem_coding_puts_a_raised_block_back_to_its_place(antenna_y):
     y = np.linspace(8, 12, 401)
     front, back, top = 9.5, 10.5, 0.3

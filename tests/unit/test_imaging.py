@@ -21,9 +21,7 @@ def frequency():
 @pytest.fixture(scope="module")
 def point_echo(scatterers, rail, frequency):
     """Echo of one point; its slant ranges are near 6.3 m, within the 7.5 m before repetition."""
-    return echo.simulate(
-        scatterers([0.2, 6.0, 0.1]), rail, frequency=frequency, accuracy_db=None
-    )
+    return echo.simulate(scatterers([0.2, 6.0, 0.1]), rail, frequency=frequency, accuracy_db=None)
 
 
 def compress(signal, near=4.0, far=7.4, **options):
@@ -124,9 +122,9 @@ def test_a_pixel_does_not_depend_on_the_grid_around_it(point_echo, rail):
     profiles = compress(point_echo)
     whole = image(profiles, rail)["image"].values
     for row, column in ((0, 0), (31, 3), (32, 24), (69, 12)):
-        single = imaging.backproject(
-            profiles, rail, x=X[column : column + 1], y=Y[row : row + 1]
-        )["image"].values[:, 0, 0]
+        single = imaging.backproject(profiles, rail, x=X[column : column + 1], y=Y[row : row + 1])[
+            "image"
+        ].values[:, 0, 0]
         np.testing.assert_allclose(single, whole[:, row, column], atol=1e-5)
 
 
@@ -134,6 +132,13 @@ def test_images_are_linear_in_the_echo(point_echo, rail):
     twice = point_echo.assign(echo=point_echo["echo"] * 2j)
     found, single = image(compress(twice), rail), image(compress(point_echo), rail)
     np.testing.assert_allclose(found["image"], 2j * single["image"], atol=1e-6)
+
+
+def test_one_channel_alone_keeps_its_name_and_its_image(point_echo, rail):
+    upper = image(compress(point_echo.sel(channel=["upper"])), rail.sel(channel=["upper"]))
+    both = image(compress(point_echo), rail)
+    assert upper["channel"].values.tolist() == ["upper"]
+    np.testing.assert_array_equal(upper["image"][0], both["image"].sel(channel="upper"))
 
 
 def test_inputs_are_not_changed(point_echo, rail):

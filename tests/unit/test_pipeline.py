@@ -40,7 +40,7 @@ def test_stages_come_after_what_they_read():
 
 
 def test_the_true_scene_reaches_the_processing_only_as_an_echo():
-    scene = {"terrain", "facets", "visibility", "truth"}
+    scene = {"terrain", "facets", "visibility", "truth", "echo", "true_trajectory"}
     for name in PROCESSING:
         assert not scene & set(pipeline.STAGES[name].inputs), name
         assert "scene" not in pipeline.STAGES[name].sections, name
@@ -48,7 +48,7 @@ def test_the_true_scene_reaches_the_processing_only_as_an_echo():
 
 def test_processing_is_blind_to_the_terrain_but_for_the_echo(study, products):
     # The same echo with the truth taken away gives the same heights.
-    blind = {name: products[name] for name in ("echo", "trajectory")}
+    blind = {name: products[name] for name in ("received", "trajectory", "recorded_trajectory")}
     for name in PROCESSING:
         blind[name] = pipeline.run_stage(name, blind, study)
     xr.testing.assert_identical(blind["dem"], products["dem"])
@@ -80,9 +80,9 @@ def test_the_seed_moves_the_facets_and_nothing_else_of_the_scene(study, products
 
 
 def test_noise_does_not_move_the_facets(study, products):
-    noisy = pipeline.run(changed(study, "echo", snr_db=10.0), only="echo")
+    noisy = pipeline.run(changed(study, "echo", snr_db=10.0), only="received")
     xr.testing.assert_identical(noisy["facets"], products["facets"])
-    difference = noisy["echo"]["echo"].values - products["echo"]["echo"].values
+    difference = noisy["received"]["echo"].values - products["received"]["echo"].values
     assert np.abs(difference).min() > 0
 
 

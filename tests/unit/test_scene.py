@@ -110,9 +110,7 @@ def test_sample_reproduces_bilinear_functions(terms, points):
     def surface(u, v):
         return a + b * u + c * v + d * u * v
 
-    raster = xr.DataArray(
-        surface(x[None, :], y[:, None]), dims=("y", "x"), coords={"x": x, "y": y}
-    )
+    raster = xr.DataArray(surface(x[None, :], y[:, None]), dims=("y", "x"), coords={"x": x, "y": y})
     at = np.array(points)
     found = scene.sample(raster, at[:, 0], at[:, 1])
     np.testing.assert_allclose(found, surface(at[:, 0], at[:, 1]), atol=1e-11)
@@ -165,6 +163,14 @@ def test_jitter_is_the_full_width_of_a_uniform_displacement(jitter):
     assert np.abs(offset).max() == pytest.approx(jitter / 2, abs=1e-3)
     # Its standard deviation is width / sqrt(12), known here to 1 / sqrt(12000) of itself.
     assert offset.std() == pytest.approx(jitter / np.sqrt(12), rel=0.03, abs=1e-9)
+
+
+def test_jitter_in_x_and_y_is_independent():
+    position = cut(make("flat", spacing_m=0.5), 1.0, size=0.05)["facet_position"].values
+    offset_x, offset_y = (position[:, 0] + 2.5) / 0.05 % 1, (position[:, 1] - 10) / 0.05 % 1
+    # The correlation of n independent pairs scatters by 1 / sqrt(n); four of that.
+    correlation = np.corrcoef(offset_x, offset_y)[0, 1]
+    assert abs(correlation) < 4 / np.sqrt(len(position))
 
 
 def test_facets_larger_than_the_terrain_are_one_facet():

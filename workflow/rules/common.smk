@@ -4,7 +4,7 @@ import os
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
-from vinsar import claims, figures, pipeline, provenance, validation
+from vinsar import claims, figures, pipeline, provenance, sweep, validation
 
 SUFFIXES = ("pdf", "svg", "png")
 PANELS = [
@@ -22,8 +22,7 @@ for sentence in validation.advice(STUDY):
 
 def configuration(*sections):
     """The sections that a job reads, and no others: a change elsewhere must not rerun it."""
-    values = STUDY.model_dump(mode="json", include={"study", *sections})
-    return dict(sorted(values.items()))
+    return {"study": STUDY.study} | dict(sorted(STUDY.values(sections).items()))
 
 
 def sources_of(*modules, script):
@@ -64,3 +63,9 @@ def figure_files(*names, caption):
         png = report(f"{stem}.png", labels={"figure": name}, **shown)
         files += [f"{stem}.pdf", f"{stem}.svg", png]
     return files
+
+
+def sweep_configuration(wildcards):
+    """What a sweep's cases read: not how figures look, where it runs, nor other sweeps."""
+    one = STUDY.sweeps[wildcards.sweep].model_dump(mode="json")
+    return configuration(*sweep.declared()) | {"sweep": one}

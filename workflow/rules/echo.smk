@@ -4,7 +4,7 @@
 rule echo:
     input:
         facets="<results>/facets.nc",
-        trajectory="<results>/trajectory.nc",
+        true_trajectory="<results>/true_trajectory.nc",
         visibility="<results>/visibility.nc",
         code=stage_sources("echo"),
     output:
@@ -16,5 +16,23 @@ rule echo:
     threads: workflow.cores
     params:
         configuration=stage_configuration("echo"),
+    script:
+        "../scripts/stage.py"
+
+
+rule received:
+    input:
+        echo="<results>/echo.nc",
+        facets="<results>/facets.nc",
+        true_trajectory="<results>/true_trajectory.nc",
+        code=stage_sources("received"),
+    output:
+        "<results>/received.nc",
+    log:
+        "<logs>/received.log",
+    benchmark:
+        "<benchmarks>/received.tsv"
+    params:
+        configuration=stage_configuration("received"),
     script:
         "../scripts/stage.py"

@@ -3,7 +3,7 @@
 
 rule profiles:
     input:
-        echo="<results>/echo.nc",
+        received="<results>/received.nc",
         trajectory="<results>/trajectory.nc",
         code=stage_sources("profiles"),
     output:
@@ -21,7 +21,7 @@ rule profiles:
 rule images:
     input:
         profiles="<results>/profiles.nc",
-        trajectory="<results>/trajectory.nc",
+        recorded_trajectory="<results>/recorded_trajectory.nc",
         code=stage_sources("images"),
     output:
         "<results>/images.nc",
@@ -32,5 +32,22 @@ rule images:
     threads: workflow.cores
     params:
         configuration=stage_configuration("images"),
+    script:
+        "../scripts/stage.py"
+
+
+rule focus:
+    input:
+        true_trajectory="<results>/true_trajectory.nc",
+        recorded_trajectory="<results>/recorded_trajectory.nc",
+        code=stage_sources("focus"),
+    output:
+        "<results>/focus.nc",
+    log:
+        "<logs>/focus.log",
+    benchmark:
+        "<benchmarks>/focus.tsv"
+    params:
+        configuration=stage_configuration("focus"),
     script:
         "../scripts/stage.py"

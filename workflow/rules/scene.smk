@@ -16,6 +16,38 @@ rule trajectory:
         "../scripts/stage.py"
 
 
+rule true_trajectory:
+    input:
+        trajectory="<results>/trajectory.nc",
+        code=stage_sources("true_trajectory"),
+    output:
+        "<results>/true_trajectory.nc",
+    log:
+        "<logs>/true_trajectory.log",
+    benchmark:
+        "<benchmarks>/true_trajectory.tsv"
+    params:
+        configuration=stage_configuration("true_trajectory"),
+    script:
+        "../scripts/stage.py"
+
+
+rule recorded_trajectory:
+    input:
+        trajectory="<results>/trajectory.nc",
+        code=stage_sources("recorded_trajectory"),
+    output:
+        "<results>/recorded_trajectory.nc",
+    log:
+        "<logs>/recorded_trajectory.log",
+    benchmark:
+        "<benchmarks>/recorded_trajectory.tsv"
+    params:
+        configuration=stage_configuration("recorded_trajectory"),
+    script:
+        "../scripts/stage.py"
+
+
 rule terrain:
     input:
         code=stage_sources("terrain"),
@@ -51,7 +83,7 @@ rule visibility:
     input:
         terrain="<results>/terrain.nc",
         facets="<results>/facets.nc",
-        trajectory="<results>/trajectory.nc",
+        true_trajectory="<results>/true_trajectory.nc",
         code=stage_sources("visibility"),
     output:
         "<results>/visibility.nc",

@@ -6,18 +6,22 @@ from contextlib import contextmanager
 
 import dask
 
-from vinsar import provenance, storage
+from vinsar import provenance, storage, sweep
 
 
 @contextmanager
 def job(snakemake):
     """Log to the rule's file; say what went wrong in a sentence, not in a traceback."""
     logging.basicConfig(filename=snakemake.log[0], level=logging.INFO, format="%(message)s")
+    logging.getLogger("distributed").setLevel(logging.WARNING)
     dask.config.set(num_workers=snakemake.threads)
     try:
         yield
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, sweep.SweepError) as error:
         logging.error("%s: %s", snakemake.rule, error)
+        sys.exit(1)
+    except Exception as error:
+        logging.exception("%s: a fault of vinsar itself, %s", snakemake.rule, error)
         sys.exit(1)
 
 

@@ -27,8 +27,6 @@ _DIMENSION = {
     "shrinkB": 0,
     "mutation_scale": 6,
 }
-
-
 _LEAST_ANGLE_DEG = 25
 _EDGES = ("x_min_m", "x_max_m", "y_min_m", "y_max_m")
 
@@ -316,7 +314,7 @@ def values(study: config.Study) -> list[tuple[str, str]]:
     Returns
     -------
     list of tuple of str
-        What the configuration sets; then, after an empty row, what follows for the target T.
+        The radar; then, after an empty row, what follows for the target T.
     """
     scheme, options = layout(study), study.radar
     wavelength = radar.wavelength((options.start_frequency_hz + options.stop_frequency_hz) / 2)
@@ -334,6 +332,7 @@ def values(study: config.Study) -> list[tuple[str, str]]:
             f"{options.start_frequency_hz / 1e9:g} … {options.stop_frequency_hz / 1e9:g} GHz",
         ),
         (r"wavelength $\lambda$", f"{1000 * wavelength:.1f} mm"),
+        ("slant-range resolution", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
         ("aperture $L$", f"{options.aperture_length_m:g} m"),
         ("positions", f"{positions}"),
         ("rail height $H_0$", f"{options.rail_height_m:g} m"),
@@ -345,7 +344,6 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         ("$B_∥$", _signed(1000 * float(along), ".1f", "mm")),
         ("$B_⊥$", _signed(1000 * float(across), ".1f", "mm")),
         ("height of ambiguity", _signed(float(ambiguity), ".3f", "m")),
-        ("slant-range resolution", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
         ("resolution in x", f"{100 * float(azimuth):.1f} cm"),
     ]
 

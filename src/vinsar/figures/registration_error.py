@@ -76,7 +76,7 @@ def _limit(registration: xr.Dataset, ground_axis: str) -> float:
     bands = _ALLOWED_SHARE * part["resolution"].values
     # The edge of a band a little beyond the curves is worth the room; one far beyond is not.
     near = bands[bands < 1.6 * largest]
-    return 1000 * 1.15 * max([largest, *near])
+    return 1000 * 1.15 * max([largest, 1e-6, *near])
 
 
 def _curves(

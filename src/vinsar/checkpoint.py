@@ -1,0 +1,57 @@
+"""Finished cases of a sweep on disk, so that an interrupted one goes on from them."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class Checkpoint:
+    """Rows appended to a file, a block at a time; a block that was cut short is not read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    code
+        Digest of the code that computes the rows; rows of other code are not read.
+    """
+
+    def __init__(self, path: str | Path, code: str) -> None:
+        self.path, self.code = Path(path), code
+
+    def rows(self) -> dict[str, dict[str, Any]]:
+        """Return the rows of finished cases by the cases' keys."""
+        found: dict[str, dict[str, Any]] = {}
+        if not self.path.exists():
+            return found
+        with self.path.open(encoding="utf-8") as file:
+            for line in file:
+                try:
+                    block = json.loads(line)
+                except json.JSONDecodeError:
+                    continue
+                if block["code"] == self.code:
+                    found |= block["rows"]
+        return found
+
+    def keep(self, rows: Mapping[str, Any]) -> None:
+        """Append a block's rows; they are on disk when this returns."""
+        if not rows:
+            return
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        # Begins a line of its own, whatever an interrupted write has left before.
+        text = "\n" + json.dumps({"code": self.code, "rows": rows}) + "\n"
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+
+    def remove(self) -> None:
+        """Forget the rows: the sweep is whole."""
+        self.path.unlink(missing_ok=True)

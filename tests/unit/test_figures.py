@@ -1,0 +1,598 @@
+"""The figures: what they show is what the products hold, readable, and the same bytes each time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+import yaml
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from vinsar import config, figures, geometry, pipeline
+from vinsar.figures import acquisition, chain, files, height_error, maps, style
+
+PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
+NAMES = ["fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4"]
+FORMATS = ["pdf", "svg", "png"]
+SMALL: dict[str, dict[str, Any]] = {
+    "radar": {"frequency_count": 101, "position_spacing_m": 0.02},
+    "scene": {
+        "x_min_m": -0.8,
+        "x_max_m": 0.8,
+        "y_min_m": 10.0,
+        "y_max_m": 12.0,
+        "terrain_spacing_m": 0.05,
+        "facet_size_m": 0.04,
+        "peak_height_m": 0.2,
+    },
+    "imaging": {
+        "x_min_m": -0.8,
+        "x_max_m": 0.8,
+        "y_min_m": 10.0,
+        "y_max_m": 12.0,
+        "grid_spacing_m": 0.05,
+    },
+    "filtering": {"goldstein_patch_px": 16, "goldstein_step_px": 4},
+    "height": {
+        "level_ground": [{"x_min_m": -0.8, "x_max_m": -0.6, "y_min_m": 10.0, "y_max_m": 10.2}]
+    },
+    "registration": {"height_count": 3},
+}
+
+
+def make_study(**sections: dict[str, Any]) -> config.Study:
+    values = yaml.safe_load(PAPER.read_text(encoding="utf-8"))
+    for name, section in sections.items():
+        values[name] |= section
+    return config.Study.model_validate(values)
+
+
+@pytest.fixture(scope="module")
+def study() -> config.Study:
+    return make_study(**SMALL)
+
+
+@pytest.fixture(scope="module")
+def products(study: config.Study) -> pipeline.Products:
+    return pipeline.run(study)
+
+
+class OnlySections:
+    """A study that hands out the declared sections and refuses all others."""
+
+    def __init__(self, study: config.Study, sections: tuple[str, ...]) -> None:
+        self._study, self._sections = study, sections
+
+    def __getattr__(self, name: str) -> Any:
+        assert name in self._sections, f"section '{name}' is read but not declared"
+        return getattr(self._study, name)
+
+
+def draw(name: str, products: pipeline.Products, study: config.Study) -> Figure:
+    figure = figures.FIGURES[name]
+    allowed = {key: products[key] for key in figure.inputs}
+    return figure.draw(allowed, OnlySections(study, figure.sections))  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def sheet(products: pipeline.Products, study: config.Study) -> Figure:
+    return draw("fig3", products, study)
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def drawn_texts(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> dict[Text, Any]:
+    """Return every text that reaches the paper, with its box in pixels."""
+    texts: list[Text] = []
+    original = Text.draw
+
+    def recording(self: Text, renderer: Any) -> None:
+        if self.get_visible() and self.get_text().strip() and self not in texts:
+            texts.append(self)
+        original(self, renderer)
+
+    with monkeypatch.context() as patch, style.applied():
+        patch.setattr(Text, "draw", recording)
+        figure.draw_without_rendering()
+        return {text: text.get_window_extent() for text in texts}
+
+
+def written(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    return [text.get_text() for text in drawn_texts(figure, monkeypatch)]
+
+
+def check_readable(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is cut at the edge of the paper, and no text lies on another or on other axes."""
+    boxes = drawn_texts(figure, monkeypatch)
+    assert boxes
+    width, height = figure.bbox.width, figure.bbox.height
+    for text, box in boxes.items():
+        inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height
+        assert inside, f"{text} is cut: {box}"
+    # The box of a slanting text is larger than the text.
+    straight = [(text, box) for text, box in boxes.items() if text.get_rotation() % 90 == 0]
+    for index, (text, box) in enumerate(straight):
+        for other, other_box in straight[index + 1 :]:
+            x = min(box.x1, other_box.x1) - max(box.x0, other_box.x0)
+            y = min(box.y1, other_box.y1) - max(box.y0, other_box.y0)
+            assert x < 1 or y < 1, f"{text} lies on {other}"
+    with style.applied():
+        renderer = figure._get_renderer()  # type: ignore[attr-defined]
+        areas = [axes.get_tightbbox(renderer) for axes in figure.axes]
+    for index, area in enumerate(areas):
+        for other_area in areas[index + 1 :]:
+            x = min(area.x1, other_area.x1) - max(area.x0, other_area.x0)
+            y = min(area.y1, other_area.y1) - max(area.y0, other_area.y0)
+            assert x < 1 or y < 1, f"axes overlap: {area} and {other_area}"
+
+
+def test_registry_is_complete_and_declares_known_inputs() -> None:
+    assert list(figures.FIGURES) == NAMES
+    for figure in figures.FIGURES.values():
+        assert set(figure.inputs) <= set(pipeline.STAGES)
+        assert set(figure.sections) <= set(config.Study.model_fields)
+        assert "figures" in figure.sections
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_figure_is_readable_and_takes_what_it_declares(
+    name: str,
+    products: pipeline.Products,
+    study: config.Study,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    figure = draw(name, products, study)
+    width, height = figure.get_size_inches() * style.MM_PER_INCH
+    assert width == pytest.approx(88 if len(name) == 5 else 180)
+    assert height < 247  # fits on a page of A4 with its caption
+    check_readable(figure, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("radar", "far"),
+    [
+        ({}, 30.0),
+        ({"baseline_angle_deg": 45.0, "rail_height_m": 1.6}, 12.0),
+        ({"baseline_angle_deg": 0.0, "baseline_m": 1.0}, 16.0),
+        ({"baseline_angle_deg": 120.0, "rail_height_m": 0.9, "baseline_m": 0.1}, 16.0),
+    ],
+)
+def test_geometry_is_readable_for_other_radars(
+    radar: dict[str, float], far: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = make_study(radar=radar, scene={"y_max_m": far}, imaging={"y_max_m": far})
+    figure = draw("fig1", {}, study)
+    check_readable(figure, monkeypatch)
+
+
+def test_geometry_is_to_scale_with_the_study_s_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = make_study(radar={"baseline_angle_deg": 60.0})
+    figure = draw("fig1", {}, study)
+    views = [axes for axes in figure.axes if axes.axison]
+    assert len(views) == 3
+    assert all(axes.get_aspect() == 1 for axes in views)
+    # Equal aspect has not shrunk the axes: their proportions are those of their limits.
+    for axes in views:
+        box = axes.get_position(original=True)
+        axes.apply_aspect()
+        assert axes.get_position().bounds == pytest.approx(box.bounds, abs=2e-3)
+    lower = (0.0, 0.0, 2.0)
+    upper = (0.0, 0.3 * np.cos(np.pi / 3), 2.0 + 0.3 * np.sin(np.pi / 3))
+    target = (0.0, 13.0, 0.3)
+    r1, r2 = (float(geometry.slant_range(antenna, *target)) for antenna in (lower, upper))
+    texts = written(figure, monkeypatch)
+    assert f"$r_1$ = {r1:.3f} m" in texts
+    assert f"$r_2$ = {r2:.3f} m" in texts
+    assert r"$\beta$ = 60°" in texts
+    listed = dict(acquisition.values(study))
+    assert listed[r"wavelength $\lambda$"] == "21.4 mm"
+    assert listed["positions"] == "81"
+    assert listed[r"$\Delta r = r_1 - r_2$"] == f"{1000 * (r1 - r2):.1f} mm".replace("-", "−")
+    look = np.arctan2(13.0, 2.0 - 0.3)
+    ambiguity = 0.0214137 * r1 * np.sin(look) / (2 * 0.3 * np.cos(np.pi / 3 - look))
+    assert listed["height of ambiguity"] == f"{ambiguity:.3f} m"
+    assert set(listed.values()) - {""} <= set(texts)
+
+
+def test_geometry_shows_the_image_where_it_is_not_the_scene(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    study = make_study(imaging={"x_min_m": -1.0})
+    assert "scene, image outlined" in written(draw("fig1", {}, study), monkeypatch)
+    assert "scene and image" in written(draw("fig1", {}, make_study()), monkeypatch)
+
+
+def test_registration_curves_are_the_product_s_in_millimetres(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    figure = draw("fig2", products, study)
+    product = products["registration"]
+    panels = [(axis, target) for axis in ("x", "y") for target in ("near", "far")]
+    for axes, (ground_axis, target) in zip(figure.axes[:4], panels, strict=True):
+        part = product.sel(ground_axis=ground_axis, target=target)
+        lines = {line.get_label(): line for line in axes.lines}
+        for label, name in (
+            ("radial (Eq. 7)", "radial"),
+            ("circle", "circle"),
+            ("measured on images", "measured"),
+        ):
+            np.testing.assert_allclose(lines[label].get_ydata(), 1000 * part[name].values)
+        allowed = 100 * float(part["resolution"])
+        limit = axes.get_ylim()[1]
+        values = np.concatenate([line.get_ydata() for line in axes.lines[1:]])
+        assert np.abs(values).max() < limit
+        note = next(text.get_text() for text in axes.texts)
+        assert note.startswith(f"± {allowed:.1f} mm")
+        assert ("beyond" in note) == (allowed > limit)
+    # One scale for near and far, so that the eye compares them.
+    assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
+    assert figure.axes[2].get_ylim() == figure.axes[3].get_ylim()
+    share = np.abs(product["map_circle"].sel(ground_axis="y")) / (
+        0.1 * product["map_resolution"].sel(ground_axis="y")
+    )
+    image = figure.axes[4].images[0]
+    np.testing.assert_allclose(image.get_array(), share.values)
+    assert sum(image.get_clim()) == pytest.approx(2)  # white is exactly a tenth of a cell
+
+
+def test_truth_and_reconstruction_share_colours_and_limits(
+    sheet: Figure, products: pipeline.Products, study: config.Study
+) -> None:
+    shown = [axes.images[0] for axes in sheet.axes if axes.images]
+    assert len(shown) == 8
+    truth, lower, upper, rebuilt = shown[0], shown[2], shown[3], shown[7]
+    assert truth.get_clim() == rebuilt.get_clim()
+    assert truth.get_cmap() == rebuilt.get_cmap()
+    assert truth.get_cmap().name == "batlow"
+    np.testing.assert_array_equal(truth.get_array(), products["truth"]["height"])
+    np.testing.assert_array_equal(rebuilt.get_array(), products["dem"]["height"])
+    low, high = truth.get_clim()
+    assert low <= products["truth"]["height"].min()
+    assert high >= products["truth"]["height"].max()
+    # The two images: one scale, whose zero is the strongest cell of both.
+    assert lower.get_clim() == upper.get_clim() == (-40.0, 0.0)
+    assert max(lower.get_array().max(), upper.get_array().max()) == pytest.approx(0, abs=1e-5)
+    amplitude = np.abs(products["images"]["image"].values)
+    decibels = 20 * np.log10(amplitude / amplitude.max())
+    np.testing.assert_allclose([lower.get_array(), upper.get_array()], decibels, atol=1e-4)
+    # Single panels show the same.
+    single = draw("fig3h", products, study)
+    assert single.axes[0].images[0].get_clim() == truth.get_clim()
+
+
+def test_maps_have_true_proportions_and_rise_ahead(sheet: Figure) -> None:
+    for axes in sheet.axes:
+        if axes.images:
+            assert axes.get_aspect() == 1
+            assert axes.images[0].origin == "lower"
+            assert axes.get_xlim() == pytest.approx((-0.825, 0.825))
+            assert axes.get_ylim() == pytest.approx((9.975, 12.025))
+
+
+@pytest.mark.parametrize("letter", ["e", "f", "g"])
+def test_phase_is_marked_at_multiples_of_pi(
+    letter: str, products: pipeline.Products, study: config.Study
+) -> None:
+    figure = draw(f"fig3{letter}", products, study)
+    image, bar = figure.axes[0].images[0], figure.axes[1]
+    ticks = bar.get_yticks() / np.pi
+    labels = [label.get_text() for label in bar.get_yticklabels()]
+    assert len(ticks) >= 2
+    for tick, label in zip(ticks, labels, strict=True):
+        number = label.replace("−", "-").replace("π", "")
+        scale = 2 if number.endswith("/2") else 1
+        number = number.removesuffix("/2")
+        value = float({"": "1", "-": "-1"}.get(number, number)) / scale
+        assert value == pytest.approx(tick, abs=1e-12)
+    if letter != "g":
+        assert image.get_clim() == (-np.pi, np.pi)
+        assert labels == ["−π", "0", "π"]
+        # Cyclic: the two ends are one phase and one colour.
+        ends = image.get_cmap()([0.0, 1.0])
+        np.testing.assert_allclose(ends[0], ends[1], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("limits", "most", "halves"),
+    [
+        ((-np.pi, np.pi), 7, [-2, 0, 2]),
+        ((-1.5 * np.pi, 1.5 * np.pi), 7, [-2, 0, 2]),
+        ((-0.5 * np.pi, 0.5 * np.pi), 7, [-1, 0, 1]),
+        ((0, 20 * np.pi), 7, [0, 8, 16, 24, 32, 40]),
+    ],
+)
+def test_pi_ticks_are_round_and_few(
+    limits: tuple[float, float], most: int, halves: list[int]
+) -> None:
+    assert maps.pi_ticks(limits, most) == halves
+
+
+def test_pi_labels() -> None:
+    labels = [maps.pi_label(n) for n in (-4, -3, -2, -1, 0, 1, 2, 3, 8)]
+    assert labels == ["−2π", "−3π/2", "−π", "−π/2", "0", "π/2", "π", "3π/2", "4π"]
+
+
+def test_statistics_are_the_product_s(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = draw("fig4", products, study)
+    texts = written(figure, monkeypatch)
+    rows = height_error.table_rows(products["accuracy"])
+    assert [row[0] for row in rows[2:]] == ["whole scene", "visible ground", "shadow"]
+    for row in rows:
+        for cell in row:
+            assert cell == "" or cell in texts
+    keys = ["median", "std", "percentile_95_absolute", "maximum_absolute"]
+    shares = ["fraction_within_tolerance", "fraction_reconstructed"]
+    for row, region in zip(rows[2:], products["accuracy"]["region"].values, strict=True):
+        part = products["accuracy"].sel(region=region)
+        assert int(row[1]) == int(part["cell_count"])
+        numbers = [float(cell.replace("−", "-")) for cell in row[2:]]
+        for number, key in zip(numbers[:4], keys, strict=True):
+            assert number == pytest.approx(100 * float(part[key]), abs=0.0051), key
+        for number, key in zip(numbers[4:], shares, strict=True):
+            assert number == pytest.approx(100 * float(part[key]), abs=0.051), key
+    assert "≤ 5 cm" in rows[0]
+
+
+def test_histogram_counts_every_cell_once(products: pipeline.Products, study: config.Study) -> None:
+    figure = draw("fig4", products, study)
+    histogram = next(axes for axes in figure.axes if axes.get_yscale() == "log")
+    counts = {
+        patch.get_label(): patch.get_data().values.sum()
+        for patch in histogram.patches
+        if patch.get_label()
+    }
+    cells = dict(
+        zip(
+            ("whole scene", "visible ground", "shadow"),
+            products["accuracy"]["cell_count"].values,
+            strict=True,
+        )
+    )
+    assert counts == cells
+    marks = sorted(line.get_xdata()[0] for line in histogram.lines)
+    assert marks == [-5, 5]
+
+
+def test_bins_end_at_the_tolerance_and_stay_few() -> None:
+    edges = height_error.bin_edges(np.array([0.01, -0.17, np.nan]), 0.05)
+    assert edges[0] == pytest.approx(-0.20)
+    assert edges[-1] == pytest.approx(0.20)
+    assert np.isclose(edges, 0.05).any()
+    assert len(height_error.bin_edges(np.array([50.0]), 0.05)) == 401
+    assert height_error.bin_edges(np.array([np.nan]), 0.05)[-1] == pytest.approx(0.10)
+
+
+def test_failed_cells_are_grey_counted_and_no_exception(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = {name: product.copy(deep=True) for name, product in products.items()}
+    broken["dem"]["height"][:5] = np.nan
+    broken["unwrapped"]["phase"][:] = np.nan
+    broken["accuracy"]["height_error"][:] = np.nan
+    broken["accuracy"]["height_error"][10, 10] = 3.0
+    figure = draw("fig3", broken, study)
+    shown = [axes.images[0] for axes in figure.axes if axes.images]
+    for image in (shown[6], shown[7]):
+        colour = image.to_rgba(image.get_array())[0, 0]
+        np.testing.assert_allclose(colour, matplotlib.colors.to_rgba(style.NO_DATA), atol=0.01)
+    errors = draw("fig4", broken, study)
+    assert "1 cells beyond\n± 100 cm" in written(errors, monkeypatch)
+
+
+def test_flat_ground_still_has_a_height_scale(products: pipeline.Products) -> None:
+    flat = products["truth"].copy(deep=True)
+    flat["height"][:] = 0.0
+    assert chain.height_limits(flat) == pytest.approx((-0.05, 0.05))
+    flat["height"][3, 3] = 0.31
+    assert chain.height_limits(flat) == pytest.approx((0.0, 0.35))
+
+
+def test_shadow_s_outline_follows_patches_and_drops_single_cells() -> None:
+    import xarray as xr
+
+    axis = np.arange(40) * 0.05
+    mask = np.zeros((40, 40), dtype=bool)
+    mask[5, 5] = True
+    single = xr.DataArray(mask.copy(), {"y": axis, "x": axis}, ("y", "x"))
+    axes = style.place(style.new_figure(50, 50), 5, 5, 40, 40)
+    assert not maps.outline_shadow(axes, single)
+    assert not axes.collections
+    mask[20:30, 10:30] = True
+    patch = single.copy(data=mask)
+    assert maps.outline_shadow(axes, patch)
+    (path,) = axes.collections[0].get_paths()
+    x, y = path.vertices.T
+    assert (x.min(), x.max()) == pytest.approx((axis[10] - 0.025, axis[29] + 0.025), abs=0.005)
+    assert (y.min(), y.max()) == pytest.approx((axis[20] - 0.025, axis[29] + 0.025), abs=0.005)
+
+
+@pytest.mark.parametrize("key", ["height_colormap", "phase_colormap"])
+def test_unknown_colormap_is_refused_with_its_key_and_a_hint(
+    key: str, products: pipeline.Products, study: config.Study
+) -> None:
+    options = study.figures.model_copy(update={key: "cmc.batlov"})
+    wrong = study.model_copy(update={"figures": options})
+    with pytest.raises(ValueError, match=rf"figures\.{key}.*cmc\.batlov.*cmc\.batlow"):
+        draw("fig3", products, wrong)
+
+
+def test_colormaps_are_found_by_either_collection() -> None:
+    assert figures.colormap("cmc.romaO").name == "romaO"
+    assert figures.colormap("viridis").name == "viridis"
+    with pytest.raises(ValueError, match="no colour map 'batlow nonsense'"):
+        figures.colormap("batlow nonsense")
+
+
+DRAW_FIG1 = """
+import hashlib, sys
+from pathlib import Path
+import yaml
+import vinsar.figures
+assert "matplotlib" not in sys.modules, "importing the figures is not light"
+from vinsar import config
+study = config.Study.model_validate(yaml.safe_load(Path(sys.argv[1]).read_text(encoding="utf-8")))
+paths = [Path(sys.argv[2]) / f"fig1.{suffix}" for suffix in ("pdf", "svg", "png")]
+figure = vinsar.figures.FIGURES["fig1"].draw({}, study)
+vinsar.figures.save(figure, paths, png_dpi=100)
+print(*(hashlib.sha256(path.read_bytes()).hexdigest() for path in paths))
+"""
+
+
+def test_two_processes_give_the_same_bytes_whatever_the_user_s_settings(tmp_path: Path) -> None:
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", DRAW_FIG1, str(PAPER), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    paths = [tmp_path / f"here.{suffix}" for suffix in FORMATS]
+    with matplotlib.rc_context({"lines.linewidth": 7, "font.size": 20, "pdf.fonttype": 3}):
+        before = dict(matplotlib.rcParams)
+        figures.save(draw("fig1", {}, make_study()), paths, png_dpi=100)
+        assert dict(matplotlib.rcParams) == before
+    assert result.stdout.split() == [digest(path) for path in paths]
+
+
+def save_all(figure: Figure, folder: Path) -> dict[str, bytes]:
+    paths = [folder / f"figure.{suffix}" for suffix in FORMATS]
+    figures.save(figure, paths, png_dpi=60)
+    assert sorted(folder.iterdir()) == sorted(paths)
+    return {path.suffix[1:]: path.read_bytes() for path in paths}
+
+
+@pytest.fixture(scope="module")
+def saved(sheet: Figure, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    return save_all(sheet, tmp_path_factory.mktemp("saved"))
+
+
+def test_same_figure_gives_same_bytes(
+    saved: dict[str, bytes],
+    sheet: Figure,
+    products: pipeline.Products,
+    study: config.Study,
+    tmp_path: Path,
+) -> None:
+    # Saved before, saved once more, and drawn anew from the same products.
+    assert save_all(sheet, tmp_path) == saved
+    assert save_all(draw("fig3", products, study), tmp_path) == saved
+
+
+def pdf_content(data: bytes) -> bytes:
+    """Return a PDF with its streams inflated."""
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", data, re.DOTALL)
+    inflated = []
+    for stream in streams:
+        try:
+            inflated.append(zlib.decompress(stream))
+        except zlib.error:
+            inflated.append(stream)
+    return data + b"\n".join(inflated)
+
+
+def png_chunks(data: bytes) -> list[tuple[str, bytes]]:
+    chunks, at = [], 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        chunks.append((data[at + 4 : at + 8].decode("ascii"), data[at + 8 : at + 8 + length]))
+        at += 12 + length
+    return chunks
+
+
+def test_pdf_embeds_its_fonts_as_truetype(saved: dict[str, bytes]) -> None:
+    content = pdf_content(saved["pdf"])
+    assert re.search(rb"/BaseFont /[A-Z]{6}\+DejaVuSans", content)
+    assert b"/CIDFontType2" in content
+    assert b"/FontFile2" in content
+    assert b"/Type3" not in content
+
+
+def test_svg_keeps_text_as_text(saved: dict[str, bytes]) -> None:
+    svg = saved["svg"].decode("utf-8")
+    texts = re.findall(r"<text[^>]*>([^<]+)</text>", svg)
+    assert "(h) reconstructed height" in texts
+    assert "−π" in texts
+    assert "DejaVu Sans" in svg
+
+
+def test_png_has_the_resolution_asked_for(saved: dict[str, bytes]) -> None:
+    chunks = dict(png_chunks(saved["png"]))
+    width, _ = struct.unpack(">II", chunks["IHDR"][:8])
+    assert width == pytest.approx(180 / 25.4 * 60, abs=1)
+    per_metre, _, unit = struct.unpack(">IIB", chunks["pHYs"])
+    assert unit == 1
+    assert per_metre * 0.0254 == pytest.approx(60, abs=0.1)
+
+
+def test_no_file_holds_a_date_or_a_version(saved: dict[str, bytes]) -> None:
+    assert {name for name, _ in png_chunks(saved["png"])} <= {"IHDR", "pHYs", "IDAT", "IEND"}
+    pdf = pdf_content(saved["pdf"])
+    assert b"/CreationDate" not in pdf
+    assert b"/ModDate" not in pdf
+    for data in (pdf, saved["svg"]):
+        assert not re.search(rb"D:20\d\d|20\d\d-[01]\d-[0-3]\d", data)
+        assert b"dc:date" not in data
+        assert matplotlib.__version__.encode() not in data
+
+
+def test_vector_files_stay_small(saved: dict[str, bytes]) -> None:
+    # The surface and the maps are pixels in them: thousands of facets would be megabytes.
+    assert len(saved["pdf"]) < 200_000
+    assert len(saved["svg"]) < 300_000
+
+
+def test_metadata_comes_back_from_every_format(tmp_path: Path) -> None:
+    metadata = {"study": "paper", "inputs": "a & b <ü>", "code": "0123"}
+    paths = [tmp_path / f"fig1.{suffix}" for suffix in FORMATS]
+    figures.save(style.new_figure(50, 50), paths, png_dpi=50, metadata=metadata)
+    pdf, svg, png = (path.read_bytes() for path in paths)
+    keywords = re.search(rb"/Keywords \((.*?[^\\])\)", pdf, re.DOTALL)
+    assert keywords
+    assert json.loads(keywords[1].replace(rb"\\", b"\\")) == metadata
+    description = re.search(r"<dc:description>(.*?)</dc:description>", svg.decode("utf-8"))
+    assert description
+    plain = description[1]
+    for entity, character in (("&quot;", '"'), ("&lt;", "<"), ("&gt;", ">"), ("&amp;", "&")):
+        plain = plain.replace(entity, character)
+    assert json.loads(plain) == metadata
+    texts = [data.split(b"\0", 1) for name, data in png_chunks(png) if name == "tEXt"]
+    assert {key.decode(): value.decode("latin-1") for key, value in texts} == metadata
+
+
+def test_other_suffixes_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    figure = style.new_figure(50, 50)
+    with pytest.raises(ValueError, match=r"'\.jpg'.*\.pdf, \.svg, \.png"):
+        figures.save(figure, [tmp_path / "a.png", tmp_path / "a.jpg"], png_dpi=50)
+    assert not list(tmp_path.iterdir())
+
+
+def test_failed_write_leaves_the_old_file_and_no_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "fig.png"
+    path.write_bytes(b"old")
+
+    def fail(self: Figure, target: Path, **_: Any) -> None:
+        del self
+        Path(target).write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    with pytest.raises(OSError, match="disk full"):
+        files.save(style.new_figure(50, 50), [path], png_dpi=50)
+    assert path.read_bytes() == b"old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["fig.png"]

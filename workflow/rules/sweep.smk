@@ -1,0 +1,19 @@
+# Sweeps over keys of the configuration: results/<study>/sweeps/<name>.nc.
+
+
+rule sweep:
+    input:
+        code=sources_of("sweep", script="sweep"),
+    output:
+        "<results>/sweeps/{sweep}.nc",
+    log:
+        "<logs>/sweep_{sweep}.log",
+    benchmark:
+        "<benchmarks>/sweep_{sweep}.tsv"
+    wildcard_constraints:
+        sweep="|".join(STUDY.sweeps) or "(?!)",
+    threads: workflow.cores
+    params:
+        configuration=sweep_configuration,
+    script:
+        "../scripts/sweep.py"

@@ -1,0 +1,29 @@
+"""Run a sweep, going on from what an interrupted run has finished."""
+
+import logging
+from pathlib import Path
+
+from job import attributes, job
+from progress import Progress
+
+from vinsar import checkpoint, cluster, provenance, storage, sweep, validation
+
+with job(snakemake):
+    # A line a stage and case would drown the progress.
+    logging.getLogger("vinsar").setLevel(logging.WARNING)
+    name = snakemake.wildcards.sweep
+    study = validation.check(snakemake.config)
+    code = provenance.code_digest(snakemake.input.code)
+    output = Path(snakemake.output[0])
+    finished = checkpoint.Checkpoint(output.with_name(f".{output.stem}.jsonl"), code)
+    with cluster.workers(study.dask, snakemake.threads) as compute, Progress(name) as progress:
+        result = sweep.run(
+            study,
+            name,
+            finished=finished.rows(),
+            keep=finished.keep,
+            progress=progress,
+            compute=compute,
+        )
+    storage.write(result, output, "sweep", attributes(snakemake, f"sweep {name}"))
+    finished.remove()
