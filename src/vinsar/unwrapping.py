@@ -66,6 +66,9 @@ def _whirlwind(values: Complexes, coherence: Floats, looks: float) -> Floats:
         np.ascontiguousarray(np.maximum(coherence, 1e-3), np.float32),
         looks,
         mask=np.ones(values.shape, bool),
+        # Nothing is masked, so there is nothing to bridge, and its components are not used.
+        bridge=False,
+        conncomp_algorithm="linear",
     )
     return unwrapped
 

@@ -202,7 +202,7 @@ def _tile(x, y, z, antennas):  # type: ignore[no-untyped-def]
         nearest = min(nearest, np.hypot(y[0] - antenna[1], z[0, 0] - antenna[2]))
     spacing = (x[-1] - x[0]) / max(1, x.size - 1)
     tile = TILE
-    while tile > 2 * LANES and tile * spacing > nearest / 3:
+    while tile > LANES and tile * spacing > nearest / 3:
         tile //= 2
     return tile
 
