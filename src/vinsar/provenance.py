@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import subprocess
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -137,13 +138,32 @@ def describe(
     dict of str
         Attributes; structured ones as JSON.
     """
-    versions = {name: metadata.version(name) for name in _LIBRARIES}
     return {
         "source": f"vinsar {vinsar.__version__}",
+        "vinsar_commit": commit(),
         "vinsar_study": study,
         "vinsar_stage": stage,
         "vinsar_configuration": json.dumps(configuration, sort_keys=True),
         "vinsar_inputs": json.dumps({name: sha256(inputs[name]) for name in sorted(inputs)}),
-        "vinsar_code": code_digest(code),
-        "vinsar_libraries": json.dumps(versions, sort_keys=True),
+        "vinsar_code": json.dumps({str(path): sha256(path) for path in sorted(map(str, code))}),
+        "vinsar_libraries": json.dumps(library_versions(), sort_keys=True),
     }
+
+
+@cache
+def library_versions() -> dict[str, str]:
+    """Return the versions of the libraries that compute results."""
+    return {name: metadata.version(name) for name in _LIBRARIES}
+
+
+@cache
+def commit() -> str:
+    """Return the commit of the source, with ``-dirty`` if files differ from it."""
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    try:
+        done = subprocess.run(  # noqa: S603
+            command, cwd=_PACKAGE, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return done.stdout.strip()

@@ -1,11 +1,6 @@
 """The workflow as a user runs it: on a copy of the repository, with a tiny study."""
 
 import json
-import os
-import re
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -19,52 +14,6 @@ AFTER_FILTERING = {
     "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims", "fig3",
     "fig3_panels", "fig4",
 }  # fmt: skip
-
-
-class Checkout:
-    """A copy of the repository in which Snakemake runs."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        for name in ("src", "workflow", "config", "profiles"):
-            ignore = shutil.ignore_patterns("__pycache__")
-            shutil.copytree(ROOT / name, folder / name, ignore=ignore)
-        for path in (ROOT / "Snakefile", ROOT / "tests/workflow/tiny.yaml"):
-            shutil.copy(path, folder)
-        self.results = folder / "results/tiny"
-
-    def snakemake(self, *arguments: str, extra: str = "") -> subprocess.CompletedProcess[str]:
-        files = ["tiny.yaml"]
-        if extra:
-            (self.folder / "extra.yaml").write_text(extra)
-            files.append("extra.yaml")
-        return subprocess.run(
-            [sys.executable, "-m", "snakemake", "--configfile", *files, "--nocolor", *arguments],
-            cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    def would_run(self, extra: str = "") -> set[str]:
-        """Return the rules that a dry run names."""
-        done = self.snakemake("-n", extra=extra)
-        assert done.returncode == 0, done.stderr
-        if "Nothing to be done" in done.stdout + done.stderr:
-            return set()
-        table = re.search(r"^job +count\n-.*?\n(.*?)^total", done.stdout, re.MULTILINE | re.DOTALL)
-        assert table, done.stdout
-        return {line.split()[0] for line in table[1].splitlines()} - {"all"}
-
-
-@pytest.fixture(scope="module")
-def checkout(tmp_path_factory):
-    """A checkout whose study has been run once."""
-    made = Checkout(tmp_path_factory.mktemp("checkout"))
-    done = made.snakemake()
-    assert done.returncode == 0, done.stdout + done.stderr
-    return made
 
 
 @pytest.fixture(scope="module")
@@ -169,8 +118,8 @@ def test_a_truncated_product_is_named_with_what_to_do(checkout):
     assert path.read_bytes() == whole
 
 
-def test_a_wrong_configuration_starts_no_job(tmp_path):
-    made = Checkout(tmp_path)
+def test_a_wrong_configuration_starts_no_job(new_checkout):
+    made = new_checkout()
     done = made.snakemake(
         extra="radar: {baselin_m: 0.3}\nscene: {facet_size_m: 0.2}\nfiltering: {method: lee}\n"
     )

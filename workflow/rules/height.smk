@@ -49,5 +49,7 @@ rule accuracy_summary:
         "<logs>/accuracy_summary.log",
     benchmark:
         "<benchmarks>/accuracy_summary.tsv"
+    params:
+        configuration=configuration(),
     script:
         "../scripts/accuracy_summary.py"

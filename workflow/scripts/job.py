@@ -2,11 +2,13 @@
 
 import logging
 import sys
+import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import dask
 
-from vinsar import provenance, storage, sweep
+from vinsar import lineage, provenance, storage, sweep
 
 
 @contextmanager
@@ -15,14 +17,37 @@ def job(snakemake):
     logging.basicConfig(filename=snakemake.log[0], level=logging.INFO, format="%(message)s")
     logging.getLogger("distributed").setLevel(logging.WARNING)
     dask.config.set(num_workers=snakemake.threads)
+    started, clock = time.time(), time.monotonic()
     try:
         yield
+        record(snakemake, started, time.monotonic() - clock)
     except (ValueError, OSError, sweep.SweepError) as error:
         logging.error("%s: %s", snakemake.rule, error)
         sys.exit(1)
     except Exception as error:
         logging.exception("%s: a fault of vinsar itself, %s", snakemake.rule, error)
         sys.exit(1)
+
+
+def record(snakemake, started, seconds):
+    """Record the making of every output."""
+    for path in snakemake.output:
+        lineage.write_record(
+            path,
+            folder=Path("results") / snakemake.params.configuration["study"],
+            attributes=attributes(snakemake, stage_of(snakemake, path)),
+            started=started,
+            seconds=seconds,
+            rule=snakemake.rule,
+            inputs=product_paths(snakemake),
+        )
+
+
+def stage_of(snakemake, path):
+    """Return what an output is called in its provenance: its figure, its sweep, or its rule."""
+    if snakemake.rule == "sweep":
+        return f"sweep {snakemake.wildcards.sweep}"
+    return Path(path).stem if "/figures/" in path else snakemake.rule
 
 
 def product_paths(snakemake):

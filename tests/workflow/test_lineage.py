@@ -1,0 +1,150 @@
+"""Asking results where they come from, on the finished tiny study."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import netCDF4
+import pytest
+
+CONFIG = ("--configfile", "tiny.yaml")
+
+
+class Copy:
+    """A copy of the finished study, to be spoilt."""
+
+    def __init__(self, checkout, folder):
+        self.folder = folder
+        shutil.copytree(checkout.folder, folder, dirs_exist_ok=True)
+        self.results = folder / "results/tiny"
+
+    def ask(self, *arguments):
+        return subprocess.run(
+            [sys.executable, "-m", "vinsar", *arguments],
+            cwd=self.folder,
+            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+
+@pytest.fixture
+def copy(checkout, tmp_path):
+    return Copy(checkout, tmp_path / "copy")
+
+
+def test_an_unchanged_study_is_verified(copy):
+    done = copy.ask("verify", "results/tiny", *CONFIG)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "results unchanged" in done.stdout
+
+
+def test_every_kind_of_damage_is_found_and_named(copy):
+    results = copy.results
+    flipped = bytearray((results / "dem.nc").read_bytes())
+    flipped[len(flipped) // 2] ^= 1
+    (results / "dem.nc").write_bytes(flipped)
+    image = results / "figures/fig2.png"
+    image.write_bytes(image.read_bytes()[:-100])
+    with netCDF4.Dataset(results / "terrain.nc", "a") as file:
+        file["height"].long_name = "edited"
+    fig1, fig4 = results / "figures/fig1.pdf", results / "figures/fig4.pdf"
+    one, four = fig1.read_bytes(), fig4.read_bytes()
+    fig1.write_bytes(four)
+    fig4.write_bytes(one)
+    (results / "claims.md").unlink()
+    (results / "foreign.nc").write_bytes(b"not ours")
+    done = copy.ask("verify", "results/tiny", *CONFIG)
+    assert done.returncode == 1
+    for name in (
+        "dem.nc",
+        "figures/fig2.png",
+        "terrain.nc",
+        "figures/fig1.pdf",
+        "figures/fig4.pdf",
+    ):
+        assert f"{name}: modified by hand" in done.stdout
+    assert "claims.md: missing" in done.stdout
+    assert "foreign.nc: there is no record of its making" in done.stdout
+    assert "accuracy.nc: stale: made from another dem.nc" in done.stdout
+    assert "figures/fig3.png: modified" not in done.stdout
+
+
+def test_other_code_and_configuration_make_results_stale(copy):
+    code = copy.folder / "src/vinsar/filtering.py"
+    code.write_text(code.read_text() + "\n_EDITED = True\n")
+    (copy.folder / "tiny.yaml").open("a").write("seed: 1\n")
+    done = copy.ask("verify", "results/tiny", *CONFIG)
+    assert done.returncode == 1
+    assert "filtered.nc: stale: code src/vinsar/filtering.py has changed" in done.stdout
+    assert "facets.nc: stale: configuration seed was 2014, is 1" in done.stdout
+    assert "images.nc:" not in done.stdout
+
+
+@pytest.mark.parametrize("name", ["fig4.pdf", "fig4.png", "fig4.svg"])
+def test_a_figure_is_traced_to_configuration_and_seeds(copy, name):
+    done = copy.ask("trace", f"results/tiny/figures/{name}", *CONFIG)
+    assert done.returncode == 0, done.stderr
+    for line in (
+        f"results/tiny/figures/{name} (fig4)",
+        "results/tiny/facets.nc (facets)",
+        "seed = 2014",
+        "radar.baseline_m = 0.3",
+        "imaging.grid_spacing_m = 0.05",
+    ):
+        assert line in done.stdout
+    assert "CHANGED" not in done.stdout
+
+
+def test_a_trace_marks_what_has_changed(copy):
+    path = copy.results / "echo.nc"
+    content = bytearray(path.read_bytes())
+    content[-50] ^= 1
+    path.write_bytes(content)
+    done = copy.ask("trace", "results/tiny/dem.nc", *CONFIG)
+    assert "results/tiny/echo.nc (echo) [CHANGED]" in done.stdout
+    assert "results/tiny/facets.nc (facets)\n" in done.stdout
+
+
+def test_two_studies_are_told_apart(copy):
+    shutil.copytree(copy.results, copy.folder / "results/other")
+    same = copy.ask("diff", "results/tiny", "results/other")
+    assert (same.returncode, same.stdout) == (0, "no difference\n")
+    record = copy.folder / "results/other/records/filtered.nc.json"
+    content = json.loads(record.read_text())
+    changed = json.loads(content["provenance"]["vinsar_configuration"])
+    changed["filtering"]["goldstein_alpha"] = 0.5
+    content["provenance"]["vinsar_configuration"] = json.dumps(changed)
+    record.write_text(json.dumps(content))
+    summary = copy.folder / "results/other/accuracy.json"
+    numbers = json.loads(summary.read_text())
+    numbers["whole_scene"]["std_error_m"] += 0.01
+    summary.write_text(json.dumps(numbers))
+    done = copy.ask("diff", "results/tiny", "results/other")
+    assert done.returncode == 1
+    assert "configuration filtering.goldstein_alpha: 0.8 and 0.5, -0.3" in done.stdout
+    assert "accuracy whole_scene.std_error_m:" in done.stdout
+    assert "+0.01" in done.stdout
+
+
+def test_a_folder_without_a_study_is_named(copy):
+    (copy.folder / "empty").mkdir()
+    done = copy.ask("verify", "empty")
+    assert done.returncode == 2
+    assert "empty holds no records of a study" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_same_study_elsewhere_and_on_another_number_of_cores_is_the_same_bytes(
+    checkout, new_checkout
+):
+    other = new_checkout()
+    done = other.snakemake("--cores", "1")
+    assert done.returncode == 0, done.stdout + done.stderr
+    for path in sorted(checkout.results.rglob("*")):
+        name = path.relative_to(checkout.results)
+        if path.is_file() and name.parts[0] not in {"logs", "benchmarks", "records"}:
+            assert (other.results / name).read_bytes() == path.read_bytes(), name
