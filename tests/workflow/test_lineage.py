@@ -10,6 +10,7 @@ import netCDF4
 import pytest
 
 CONFIG = ("--configfile", "tiny.yaml")
+SPOILT = ("fig1.pdf", "fig2.png", "fig4.pdf")
 
 
 class Copy:
@@ -59,13 +60,7 @@ def test_every_kind_of_damage_is_found_and_named(copy):
     (results / "foreign.nc").write_bytes(b"not ours")
     done = copy.ask("verify", "results/tiny", *CONFIG)
     assert done.returncode == 1
-    for name in (
-        "dem.nc",
-        "figures/fig2.png",
-        "terrain.nc",
-        "figures/fig1.pdf",
-        "figures/fig4.pdf",
-    ):
+    for name in ("dem.nc", "terrain.nc", *(f"figures/{figure}" for figure in SPOILT)):
         assert f"{name}: modified by hand" in done.stdout
     assert "claims.md: missing" in done.stdout
     assert "foreign.nc: there is no record of its making" in done.stdout
@@ -76,7 +71,8 @@ def test_every_kind_of_damage_is_found_and_named(copy):
 def test_other_code_and_configuration_make_results_stale(copy):
     code = copy.folder / "src/vinsar/filtering.py"
     code.write_text(code.read_text() + "\n_EDITED = True\n")
-    (copy.folder / "tiny.yaml").open("a").write("seed: 1\n")
+    tiny = copy.folder / "tiny.yaml"
+    tiny.write_text(tiny.read_text() + "seed: 1\n")
     done = copy.ask("verify", "results/tiny", *CONFIG)
     assert done.returncode == 1
     assert "filtered.nc: stale: code src/vinsar/filtering.py has changed" in done.stdout

@@ -113,7 +113,7 @@ def test_a_truncated_product_is_named_with_what_to_do(checkout):
     assert "delete it and run again" in said
     assert "Traceback" not in said
     path.unlink()
-    done = checkout.snakemake("results/tiny/dem.nc")
+    done = checkout.snakemake("results/tiny/interferogram.nc", "results/tiny/filtered.nc")
     assert done.returncode == 0, done.stdout + done.stderr
     assert path.read_bytes() == whole
 
@@ -121,12 +121,12 @@ def test_a_truncated_product_is_named_with_what_to_do(checkout):
 def test_a_wrong_configuration_starts_no_job(new_checkout):
     made = new_checkout()
     done = made.snakemake(
-        extra="radar: {baselin_m: 0.3}\nscene: {facet_size_m: 0.2}\nfiltering: {method: lee}\n"
+        extra="radar: {baselin_m: 0.3}\nscene: {x_max_m: -9.0}\nfiltering: {method: lee}\n"
     )
     said = done.stdout + done.stderr
     assert done.returncode == 1
     assert "The configuration has 3 faults" in said
-    for key in ("radar.baselin_m", "scene.facet_size_m", "filtering.method"):
+    for key in ("radar.baselin_m", "scene.x_max_m", "filtering.method"):
         assert key in said
     assert "Traceback" not in said
     assert not made.results.exists()
