@@ -12,6 +12,7 @@ configfile: "config/paper.yaml"
 container: "docker://python:3.11"
 
 
+include: "workflow/rules/lock.smk"
 include: "workflow/rules/common.smk"
 
 

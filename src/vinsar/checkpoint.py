@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Checkpoint:
-    """Rows appended to a file, a block at a time; a block that was cut short is not read.
+    """Rows appended to a file, a line a block; a line that was cut short is not read.
 
     Parameters
     ----------
@@ -30,27 +30,44 @@ class Checkpoint:
         found: dict[str, dict[str, Any]] = {}
         if not self.path.exists():
             return found
-        with self.path.open(encoding="utf-8") as file:
+        # A power cut may leave any bytes.
+        with self.path.open(encoding="utf-8", errors="replace") as file:
             for line in file:
                 try:
                     block = json.loads(line)
                 except json.JSONDecodeError:
                     continue
-                if block["code"] == self.code:
+                if isinstance(block, dict) and block.get("code") == self.code:
                     found |= block["rows"]
         return found
 
     def keep(self, rows: Mapping[str, Any]) -> None:
-        """Append a block's rows; they are on disk when this returns."""
+        """Append a block's rows; they are on disk when this returns.
+
+        Parameters
+        ----------
+        rows
+            Rows by the cases' keys, in plain values.
+
+        Raises
+        ------
+        OSError
+            If they cannot be written, as on a full disk; none of them is kept then.
+        """
         if not rows:
             return
-        self.path.parent.mkdir(parents=True, exist_ok=True)
         # Begins a line of its own, whatever an interrupted write has left before.
         text = "\n" + json.dumps({"code": self.code, "rows": rows}) + "\n"
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            # Unbuffered and at once: what others append comes before or after, not between.
+            with self.path.open("ab", buffering=0) as file:
+                data = memoryview(text.encode())
+                while data:
+                    data = data[file.write(data) :]
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise OSError(f"cannot write {self.path}: {error.strerror or error}") from error
 
     def remove(self) -> None:
         """Forget the rows: the sweep is whole."""

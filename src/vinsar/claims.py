@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from vinsar import geometry, radar
+from vinsar import baseline, config, geometry, radar, variables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,24 +19,33 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from vinsar import config
-
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
     Products = Mapping[str, xr.Dataset]
 
-Verdict = Literal["reproduced", "partly", "contradicted"]
+Verdict = Literal["reproduced", "partly", "contradicted", "undecided"]
 
 INPUTS = ("registration", "images", "interferogram", "unwrapped", "dem", "truth", "accuracy")
 """Products that the claims are decided on."""
 
-SECTIONS = ("radar", "scene")
+SWEEPS = ("vibration",)
+"""Sweeps that the claims are decided on; among the products, each is ``sweeps/<name>``."""
+
+SECTIONS = ("radar", "scene", "sweeps")
 """Sections of the configuration that the claims read."""
 
 OBSTACLE_HEIGHT_M = 0.10
 """Height or depth that a vehicle has to avoid, for the claims on alarms."""
 
 _BASELINE_ERROR_M = 1e-3
+
+PAPER_STD_M = 0.045
+"""Spread of the height error that the paper reports without position errors (section 2.3)."""
+
+# A spread of this share of the relief's own is no better than a DEM of level ground.
+_FAILED_SHARE = 0.9
+# Growth that counts as such, beside the scatter of the realizations.
+_GROWTH = 0.1
 
 
 @dataclass(frozen=True)
@@ -71,12 +80,12 @@ class Claim:
 
 
 def evaluate(products: Products, study: config.Study) -> list[Claim]:
-    """Decide every claim of Figs. 2-4 and section 1.2.
+    """Decide every claim of Figs. 2-5 and section 1.2.
 
     Parameters
     ----------
     products
-        The products named in `INPUTS`.
+        The products named in `INPUTS` and the sweeps named in `SWEEPS`.
     study
         The configuration; the sections in `SECTIONS` are read.
 
@@ -86,6 +95,7 @@ def evaluate(products: Products, study: config.Study) -> list[Claim]:
         In the order of the paper's figures.
     """
     shifts = products["registration"]
+    shaken = _Shaken.of(products, study)
     return [
         _registration_sign(shifts),
         _registration_centre(shifts),
@@ -98,12 +108,19 @@ def evaluate(products: Products, study: config.Study) -> list[Claim]:
         _spread(products["accuracy"]),
         _worst_error(products, study),
         _false_alarms(products, study),
+        _most_sensitive(shaken),
+        _tolerated(shaken),
+        _bounded(shaken),
     ]
 
 
 def as_json(claims: list[Claim]) -> list[dict[str, Any]]:
-    """Return the claims as plain dictionaries."""
-    return [asdict(claim) for claim in claims]
+    """Return the claims as plain dictionaries; what is not finite has no place in JSON."""
+    return [
+        asdict(claim)
+        | {"figures": {key: value for key, value in claim.figures.items() if np.isfinite(value)}}
+        for claim in claims
+    ]
 
 
 def as_markdown(claims: list[Claim]) -> str:
@@ -453,3 +470,222 @@ def _single(shape: tuple[int, ...]) -> Flags:
     mask = np.zeros(shape, bool)
     mask[shape[0] // 2, shape[1] // 2] = True
     return mask
+
+
+@dataclass(frozen=True)
+class _Shaken:
+    """The sweep of Fig. 5 as the claims read it.
+
+    Attributes
+    ----------
+    mean, error
+        Height std over the whole scene, m: mean over the realizations and its standard error, by
+        mode, axis and level.
+    levels
+        Levels in wavelengths, rising.
+    relief
+        Standard deviation of the true terrain: the error of a DEM of level ground, m.
+    random
+        Standard deviation of the height under a uniformly random phase, m.
+    """
+
+    mean: xr.DataArray
+    error: xr.DataArray
+    levels: Floats
+    relief: float
+    random: float
+
+    @classmethod
+    def of(cls, products: Products, study: config.Study) -> _Shaken:
+        sweep = variables.swept(
+            products["sweeps/vibration"],
+            "motion_channels",
+            "motion_axis",
+            "motion_level_wavelengths",
+        ).sortby("motion_level_wavelengths")
+        deviation = sweep["std"].sel(region="whole_scene", drop=True)
+        count = deviation.sizes["realization"]
+        scatter = (
+            deviation.std("realization", ddof=1) if count > 1 else 0 * deviation.mean("realization")
+        )
+        radar_ = config.swept_section(study, "vibration", "radar")
+        seen = baseline.view(radar_, config.swept_section(study, "vibration", "scene"))
+        return cls(
+            deviation.mean("realization"),
+            scatter / np.sqrt(count),
+            sweep["motion_level_wavelengths"].values,
+            float(products["truth"]["height"].std()),
+            float(seen.random_phase_std(radar_.baseline_m)),
+        )
+
+    def lacks(self, *, level: float, least_count: int = 1) -> str:
+        """Return what the sweep lacks for a claim that needs levels from this one on."""
+        needs = {
+            "motion.channels common": "common" in self.mean["motion_channels"],
+            "motion.axis x, y and z": {"x", "y", "z"} <= set(self.mean["motion_axis"].values),
+            "the level 0": 0 in self.levels,
+            f"levels of {level:g} wavelengths or more": (
+                int((self.levels >= level).sum()) >= least_count
+            ),
+        }
+        return ", ".join(name for name, there in needs.items() if not there)
+
+    def curve(self, axis: str, mode: str = "common") -> Floats:
+        """Return the mean std by level, m."""
+        return np.asarray(self.mean.sel(motion_channels=mode, motion_axis=axis).values)
+
+    @property
+    def floor(self) -> float:
+        """Height std without position errors, m."""
+        return float(self.mean.sel(motion_channels="common", motion_level_wavelengths=0).mean())
+
+    def reached(self, axis: str, std_m: float, mode: str = "common") -> float:
+        """Return the lowest level, in wavelengths, that reaches a std; infinite if none does."""
+        above = self.levels[self.curve(axis, mode) >= std_m]
+        return float(above[0]) if above.size else float("inf")
+
+    def quote(self, level: float, axes: str = "xyz") -> str:
+        """Return the stds at a level in words, common errors and, beside them, independent ones."""
+        at = int(np.abs(self.levels - level).argmin())
+        words = [f"{axis} {100 * self.curve(axis)[at]:.1f} cm" for axis in axes]
+        text = ", ".join(words)
+        if "independent" in self.mean["motion_channels"]:
+            other = [f"{100 * self.curve(axis, 'independent')[at]:.0f}" for axis in axes]
+            text += f" (independent errors: {', '.join(other)} cm)"
+        return text
+
+
+def _wavelengths(level: float) -> str:
+    if not np.isfinite(level):
+        return "no level of the sweep"
+    return f"{level:g} wavelength" + ("s" if level != 1 else "")
+
+
+def _undecided(id_: str, paper: str, criterion: str, lacking: str) -> Claim:
+    return Claim(
+        id_,
+        "2.4",
+        paper,
+        f"the sweep `vibration` of this study lacks {lacking}",
+        criterion,
+        "undecided",
+        {},
+    )
+
+
+def _most_sensitive(shaken: _Shaken) -> Claim:
+    id_ = "F5-y"
+    paper = "height is most sensitive to y (forward) errors; beyond one wavelength it fails"
+    criterion = (
+        "for errors common to both antennas, three statements: y doubles the error-free std at a "
+        "lower level than x and z; it has the largest std at every level at which one exceeds the "
+        "error-free one by a tenth; from 1 wavelength on its std is 0.9 or more of the relief's "
+        "own, which a DEM of level ground has. Reproduced if all hold, partly if some do"
+    )
+    if lacking := shaken.lacks(level=1):
+        return _undecided(id_, paper, criterion, lacking)
+    x, y, z = (shaken.curve(axis) for axis in "xyz")
+    doubled = {axis: shaken.reached(axis, 2 * shaken.floor) for axis in "xyz"}
+    failed = shaken.reached("y", _FAILED_SHARE * shaken.relief)
+    seen = np.maximum(np.maximum(x, y), z) > 1.1 * shaken.floor
+    most = seen & (y >= x) & (y >= z)
+    beyond = shaken.levels >= 1
+    holds = (
+        doubled["y"] < min(doubled["x"], doubled["z"]),
+        bool(seen.any() and (most == seen).all()),
+        bool((y[beyond] >= _FAILED_SHARE * shaken.relief).all()),
+    )
+    share = float(most.sum() / max(1, seen.sum()))
+    overtaken = shaken.levels[seen & ~most]
+    other = f", first overtaken at {_wavelengths(overtaken[0])}" if overtaken.size else ""
+    return Claim(
+        id_,
+        "2.4",
+        paper,
+        f"the std doubles at {_wavelengths(doubled['y'])} in y, {_wavelengths(doubled['z'])} in z, "
+        f"{_wavelengths(doubled['x'])} in x; y has the largest at {100 * share:.0f} % of the "
+        f"levels{other}; it fails (a level DEM has {100 * shaken.relief:.1f} cm) from "
+        f"{_wavelengths(failed)} on. At 1 wavelength {shaken.quote(1)}",
+        criterion,
+        _verdict(all(holds), any(holds)),
+        {
+            "doubled_x_wavelengths": doubled["x"],
+            "doubled_y_wavelengths": doubled["y"],
+            "doubled_z_wavelengths": doubled["z"],
+            "failed_y_wavelengths": failed,
+            "fraction_of_levels_with_y_largest": share,
+            "floor_std_m": shaken.floor,
+            "relief_std_m": shaken.relief,
+        },
+    )
+
+
+def _tolerated(shaken: _Shaken) -> Claim:
+    id_, paper = "F5-xz", "x and z errors of two wavelengths are tolerated"
+    criterion = (
+        "tolerated: with errors common to both antennas, the std is at most the 4.5 cm that the "
+        "paper has without errors. Reproduced if x and z are at the sweep's level nearest to 2 "
+        "wavelengths, partly if one is"
+    )
+    if lacking := shaken.lacks(level=2):
+        return _undecided(id_, paper, criterion, lacking)
+    at = int(np.abs(shaken.levels - 2).argmin())
+    found = {axis: float(shaken.curve(axis)[at]) for axis in "xz"}
+    kept = {axis: shaken.reached(axis, np.nextafter(PAPER_STD_M, 1)) for axis in "xz"}
+    good = [value <= PAPER_STD_M for value in found.values()]
+    return Claim(
+        id_,
+        "2.4",
+        paper,
+        f"at {shaken.levels[at]:g} wavelengths {shaken.quote(2, 'xz')}, against "
+        f"{100 * shaken.floor:.1f} cm without errors and {100 * shaken.relief:.1f} cm of a level "
+        f"DEM; x exceeds 4.5 cm from {_wavelengths(kept['x'])} on, z from "
+        f"{_wavelengths(kept['z'])} on",
+        criterion,
+        _verdict(all(good), any(good)),
+        {
+            "level_wavelengths": float(shaken.levels[at]),
+            "std_x_m": found["x"],
+            "std_z_m": found["z"],
+            "exceeded_x_wavelengths": kept["x"],
+            "exceeded_z_wavelengths": kept["z"],
+        },
+    )
+
+
+def _bounded(shaken: _Shaken) -> Claim:
+    id_, paper = "F5-bounded", "the spread does not grow without bound"
+    criterion = (
+        "an axis has stopped growing if, with errors common to both antennas, the std at the "
+        "highest level exceeds that at the level nearest to half of it by no more than a tenth and "
+        "two standard errors. Reproduced if all three have, partly if some have"
+    )
+    if lacking := shaken.lacks(level=1, least_count=2):
+        return _undecided(id_, paper, criterion, lacking)
+    half = int(np.abs(shaken.levels[:-1] - shaken.levels[-1] / 2).argmin())
+    growth, stopped = {}, []
+    for axis in "xyz":
+        curve = shaken.curve(axis)
+        error = shaken.error.sel(motion_channels="common", motion_axis=axis).values
+        scatter = 2 * float(np.hypot(error[half], error[-1]))
+        growth[axis] = float(curve[-1] / curve[half] - 1)
+        stopped.append(bool(curve[-1] - curve[half] <= _GROWTH * curve[half] + scatter))
+    words = ", ".join(f"{axis} {100 * value:+.0f} %" for axis, value in growth.items())
+    return Claim(
+        id_,
+        "2.4",
+        paper,
+        f"from {shaken.levels[half]:g} to {shaken.levels[-1]:g} wavelengths the std changes by "
+        f"{words}, to {shaken.quote(float(shaken.levels[-1]))}; a level DEM has "
+        f"{100 * shaken.relief:.1f} cm, a uniformly random phase without unwrapping "
+        f"{100 * shaken.random:.1f} cm",
+        criterion,
+        _verdict(all(stopped), any(stopped)),
+        {
+            "growth_x": growth["x"],
+            "growth_y": growth["y"],
+            "growth_z": growth["z"],
+            "highest_std_m": float(max(shaken.curve(axis)[-1] for axis in "xyz")),
+            "random_phase_std_m": shaken.random,
+        },
+    )

@@ -14,9 +14,17 @@ if TYPE_CHECKING:
 
     from vinsar import config
 
-    Compute = Callable[[Callable[[Any], Any], list[Any], Callable[[Any], None]], None]
+    Function = Callable[[Any], Any]
+    Receive = Callable[[Any], None]
+    Lost = Callable[[Any, str], None]
+    Compute = Callable[[Function, list[Any], Receive, Lost], None]
 
-_PATIENCE_S = 10
+logger = logging.getLogger(__name__)
+
+_PATIENCE_S = 5
+
+# What a thread of a worker is given at a time: one to run, one to begin with next.
+_AT_A_TIME = 2
 
 
 @contextmanager
@@ -35,17 +43,21 @@ def workers(options: config.Dask, count: int) -> Iterator[Compute]:
     Yields
     ------
     callable
-        ``compute(function, blocks, receive)`` calls ``receive`` in this thread with each result,
-        in any order.
+        ``compute(function, blocks, receive, lost)`` calls, in this thread and in any order,
+        ``receive`` with each result, or ``lost`` with a block, a list, that could not be run and a
+        sentence that says why.
 
     Raises
     ------
-    ValueError
-        If no scheduler answers at the address.
+    ConnectionError
+        If no scheduler answers at the address, or it goes away.
     """
     import dask
 
     address = options.address or dask.config.get("scheduler-address", None)
+    # Distributed tells of each connection otherwise; it sets its loggers when it is imported.
+    if "logging" not in dask.config.config:
+        dask.config.set({"logging.distributed": "warning"})
     if address:
         with _connect(address) as client:
             yield partial(_on_cluster, client)
@@ -57,22 +69,45 @@ def workers(options: config.Dask, count: int) -> Iterator[Compute]:
 
 
 def _connect(address: str) -> Any:
-    from distributed import Client
+    import asyncio
+
+    from distributed import Client, Security
+    from distributed.comm import connect
+
+    async def knock() -> None:
+        arguments = Security().get_connection_args("client")
+        (await connect(address, timeout=_PATIENCE_S, **arguments)).abort()
 
     try:
+        # A client whose first connection fails cannot be closed and holds up the end of Python.
+        asyncio.run(knock())
         return Client(address, timeout=_PATIENCE_S)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise ValueError(
-            f"no Dask scheduler answers at {address} within {_PATIENCE_S} s ({error}); start it, "
-            "or take the address out of `dask.address` and DASK_SCHEDULER_ADDRESS"
+    except Exception as error:  # what answers may be anything
+        raise ConnectionError(
+            f"no Dask scheduler answers at {address} ({error}); start it, or take the address out "
+            "of `dask.address` and DASK_SCHEDULER_ADDRESS"
         ) from error
 
 
 @contextmanager
 def _processes(count: int) -> Iterator[Any]:
-    from distributed import Client, LocalCluster
+    import signal
+
+    import dask
+    from distributed import Client, LocalCluster, WorkerPlugin
+
+    class LeaveInterrupts(WorkerPlugin):  # type: ignore[misc]
+        """Ctrl-C reaches workers too, but it is this process that ends them."""
+
+        def setup(self, worker: Any) -> None:
+            del worker
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     with (
+        # Looking at the working thread, and at the clock, many times a second takes 5 % of a core.
+        dask.config.set(
+            {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
+        ),
         LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -81,46 +116,111 @@ def _processes(count: int) -> Iterator[Any]:
             host="127.0.0.1",
             dashboard_address=None,
             worker_dashboard_address=None,
-            scheduler_kwargs={"dashboard": False},
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             # The products that a stage keeps bound the memory.
             memory_limit=0,
             silence_logs=logging.ERROR,
         ) as cluster,
         Client(cluster) as client,
     ):
+        client.register_plugin(LeaveInterrupts())
         yield client
 
 
 def _on_threads(
-    count: int,
-    function: Callable[[Any], Any],
-    blocks_: list[Any],
-    receive: Callable[[Any], None],
+    count: int, function: Function, blocks_: list[Any], receive: Receive, lost: Lost
 ) -> None:
     import dask
     from dask.callbacks import Callback
 
+    del lost  # A thread that dies takes the process with it.
+
     def finished(_key: Any, result: Any, *_: Any) -> None:
         receive(result)
 
-    with Callback(posttask=finished), dask.config.set(num_workers=count):
+    with Callback(posttask=finished), dask.config.set(scheduler="threads", num_workers=count):
         blocks.run(function, ((block,) for block in blocks_))
 
 
-def _on_cluster(
-    client: Any,
-    function: Callable[[Any], Any],
-    blocks_: list[Any],
-    receive: Callable[[Any], None],
-) -> None:
-    from distributed import as_completed
+class _Runs:
+    """Neighbouring blocks for each worker: they share what their cases have in common."""
 
-    # In order, so that neighbouring blocks share what their cases have in common. A worker that
-    # dies takes its block with it; another worker gets it.
-    futures = [
-        client.submit(function, block, pure=False, priority=-number, retries=2)
-        for number, block in enumerate(blocks_)
-    ]
-    for future in as_completed(futures):
-        receive(future.result())
+    def __init__(self, blocks_: list[Any]) -> None:
+        # Each backwards, so that its next block is its last item.
+        self._runs: dict[str, list[Any]] = {"": blocks_[::-1]}
+
+    def take(self, worker: str) -> Any | None:
+        """Return a worker's next block; one that has none left takes half of the longest run."""
+        if "" in self._runs:
+            self._runs[worker] = self._runs.pop("")
+        elif not self._runs.get(worker):
+            longest = max(self._runs.values(), key=len)
+            half = (len(longest) + 1) // 2
+            self._runs[worker], longest[:half] = longest[:half], []
+        own = self._runs[worker]
+        return own.pop() if own else None
+
+
+def _on_cluster(
+    client: Any, function: Function, blocks_: list[Any], receive: Receive, lost: Lost
+) -> None:
+    from distributed import KilledWorker, as_completed
+    from distributed.client import FutureCancelledError
+
+    runs = _Runs(blocks_)
+    running: dict[Any, tuple[str, Any]] = {}
+    completed = as_completed()
+    suspects = []
+
+    def submit(block: Any, **where: Any) -> Any:
+        return client.submit(function, block, pure=False, **where)
+
+    def feed() -> None:
+        for worker, facts in client.scheduler_info(n_workers=-1)["workers"].items():
+            mine = sum(1 for name, _ in running.values() if name == worker)
+            for _ in range(_AT_A_TIME * facts["nthreads"] - mine):
+                block = runs.take(worker)
+                if block is not None:
+                    # Another worker gets it if this one dies.
+                    future = submit(block, workers=worker, allow_other_workers=True)
+                    running[future] = worker, block
+                    completed.add(future)
+
+    def gather(future: Any, block: Any) -> None:
+        try:
+            result = future.result()
+        except FutureCancelledError as error:
+            raise _gone(client) from error
+        except KilledWorker:
+            suspects.append(block)
+        except Exception as error:
+            lost(block, f"{type(error).__name__}: {error}")
+        else:
+            receive(result)
         future.release()
+
+    if not client.scheduler_info(n_workers=-1)["workers"]:
+        logger.warning("waiting for a worker at %s", client.scheduler.address)
+        try:
+            client.wait_for_workers(1)
+        except OSError as error:
+            raise _gone(client) from error
+    feed()
+    for future in completed:
+        _, block = running.pop(future)
+        gather(future, block)
+        feed()
+    # What was on a worker when it died may have killed it, or been beside what did: each case by
+    # itself, with nothing beside it, tells.
+    for one in [[case] for block in suspects for case in block]:
+        suspects.clear()
+        gather(submit(one), one)
+        if suspects:
+            lost(one, "its worker died each time that it was tried")
+
+
+def _gone(client: Any) -> ConnectionError:
+    return ConnectionError(
+        f"the Dask scheduler at {client.scheduler.address} is gone; the finished cases are kept, "
+        "and the next run goes on from them"
+    )

@@ -7,7 +7,8 @@ stationary or plane-wave: each antenna position has its own ranges and its own v
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Literal
+import math
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,10 +16,15 @@ from vinsar import blocks, radar, variables
 from vinsar.constants import SPEED_OF_LIGHT
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
     from numpy.typing import NDArray
 
 logger = logging.getLogger(__name__)
+
+MOST_ACCURATE_SPLAT_DB = -85.0
+"""The splat errs by -104 dB for facets at random places, by -87 dB for those on an even grid."""
 
 Weighting = Literal["amplitude", "power"]
 _POSITIONS_PER_BLOCK = 27
@@ -74,8 +80,9 @@ def simulate(
     spreading
         Amplitude falls with 1 / (transmit range x receive range), relative to the mean range.
     accuracy_db
-        Largest relative error of the fast sum (a non-uniform Fourier transform), as a norm over
-        the frequencies; None for the direct float64 sum, about 100 times slower.
+        Largest relative error of the fast sum, as a norm over the frequencies: down to
+        `MOST_ACCURATE_SPLAT_DB` a splat (`_Splat`) some 7 times as fast as the non-uniform Fourier
+        transform (finufft) that serves below; None for the direct float64 sum.
 
     Returns
     -------
@@ -85,14 +92,17 @@ def simulate(
     Raises
     ------
     ValueError
-        If the frequencies are not evenly spaced, or visibility and the other products disagree.
+        If the frequencies are not evenly spaced, a position is not finite, or visibility and the
+        other products disagree.
     """
     steps = np.diff(frequency)
     if frequency.size < 2 or not np.allclose(steps, steps[0], rtol=1e-6, atol=0):
         raise ValueError("the echo needs two or more evenly spaced frequencies")
-    position = np.ascontiguousarray(facets["facet_position"].values, dtype=float)
+    position = facets["facet_position"].values.astype(float)
     amplitude = amplitudes(facets, reflectivity)
     transmitter, receiver = trajectory["transmitter"].values, trajectory["receiver"].values
+    if not all(np.isfinite(places).all() for places in (position, transmitter, receiver)):
+        raise ValueError("a facet or an antenna is at a position that is not a number")
     channels, positions = transmitter.shape[:2]
     if visibility is None:
         visible = np.broadcast_to(np.array(True), (channels, positions, len(position)))
@@ -108,11 +118,12 @@ def simulate(
         centre = position.mean(axis=0)
         reference = float(np.linalg.norm(transmitter.mean(axis=(0, 1)) - centre))
     result = np.empty((channels, positions, frequency.size), dtype=np.complex128)
+    columns = np.ascontiguousarray(position.T)
 
     def work(channel: int, begin: int) -> None:
         chosen = slice(begin, min(begin + _POSITIONS_PER_BLOCK, positions))
         _simulate_block(
-            result[channel, chosen], position, amplitude, visible[channel, chosen],
+            result[channel, chosen], columns, amplitude, visible[channel, chosen],
             transmitter[channel, chosen], receiver[channel, chosen], frequency, reference,
             accuracy_db,
         )  # fmt: skip
@@ -141,59 +152,130 @@ def _simulate_block(
     reference: float,
     accuracy_db: float | None,
 ) -> None:
-    from vinsar.kernels import paths
-
-    path, weight = np.empty(len(facets)), np.empty(len(facets))
-    plan = None if accuracy_db is None else _Transform(frequency, accuracy_db)
+    total: Callable[..., NDArray[np.complex128]]
+    if accuracy_db is None:
+        total = _Direct(frequency, amplitude.size)
+    elif accuracy_db >= MOST_ACCURATE_SPLAT_DB:
+        total = _Splat(frequency)
+    else:
+        total = _Transform(frequency, amplitude.size, accuracy_db)
     for index in range(len(out)):
-        count = paths.gather(
-            facets, amplitude, visible[index], transmitter[index], receiver[index], reference,
-            path, weight,
-        )  # fmt: skip
-        if plan is None:
-            out[index] = _direct(path[:count], weight[:count], frequency)
-        else:
-            out[index] = plan(path[:count], weight[:count])
+        seen = np.ascontiguousarray(visible[index])
+        out[index] = total(facets, amplitude, seen, transmitter[index], receiver[index], reference)
 
 
-def _direct(
-    path: NDArray[np.floating], weight: NDArray[np.floating], frequency: NDArray[np.floating]
-) -> NDArray[np.complex128]:
-    # In pieces, so that memory does not grow with the facets.
-    total = np.zeros(frequency.size, dtype=np.complex128)
-    for begin in range(0, path.size, 4096):
-        piece = slice(begin, begin + 4096)
-        turns = np.outer(frequency / SPEED_OF_LIGHT, path[piece])
-        total += np.exp(-2j * np.pi * turns) @ weight[piece]
-    return total
+class _Direct:
+    """The sum over facets as it stands, in double precision."""
+
+    def __init__(self, frequency: NDArray[np.floating], facets: int) -> None:
+        self.frequency = frequency
+        self.path, self.weight = np.empty(facets), np.empty(facets)
+
+    def __call__(self, *gathered: Any) -> NDArray[np.complex128]:
+        from vinsar.kernels import paths
+
+        gather: Callable[..., int] = paths.gather
+        count = gather(*gathered, self.path, self.weight)
+        total = np.zeros(self.frequency.size, dtype=np.complex128)
+        # In pieces, so that memory does not grow with the facets.
+        for begin in range(0, count, 4096):
+            piece = slice(begin, min(begin + 4096, count))
+            turns = np.outer(self.frequency / SPEED_OF_LIGHT, self.path[piece])
+            total += np.exp(-2j * np.pi * turns) @ self.weight[piece]
+        return total
+
+
+class _Comb:
+    """The frequencies as modes of a Fourier transform: mode k is number ``k + size // 2``."""
+
+    def __init__(self, frequency: NDArray[np.floating]) -> None:
+        self.size = frequency.size
+        step = float(frequency[-1] - frequency[0]) / (self.size - 1)
+        self.turns_per_metre = float(frequency[self.size // 2]) / SPEED_OF_LIGHT
+        self.steps_per_metre = step / SPEED_OF_LIGHT
 
 
 class _Transform:
     """The sum over facets as a type-1 non-uniform Fourier transform, planned once a block."""
 
-    def __init__(self, frequency: NDArray[np.floating], accuracy_db: float) -> None:
+    def __init__(self, frequency: NDArray[np.floating], facets: int, accuracy_db: float) -> None:
         import finufft
 
-        count = frequency.size
-        # Mode k of the transform is frequency number k + count // 2.
-        self.center = float(frequency[count // 2])
-        self.step = float(frequency[-1] - frequency[0]) / (count - 1)
+        self.comb = _Comb(frequency)
         self.plan = finufft.Plan(
-            1, (count,), eps=max(10 ** (accuracy_db / 20), 1e-14), isign=-1, nthreads=1
+            1,
+            (frequency.size,),
+            eps=max(10 ** (accuracy_db / 20) / 2, 1e-14),  # it errs by up to its eps and more
+            isign=-1,
+            nthreads=1,
         )
-        self.count = count
+        self.path, self.weight = np.empty(facets), np.empty(facets)
+        self.angle, self.strength = np.empty(facets), np.empty(facets, np.complex128)
+
+    def __call__(self, *gathered: Any) -> NDArray[np.complex128]:
+        from vinsar.kernels import paths
+
+        comb = self.comb
+        gather: Callable[..., int] = paths.gather
+        count = gather(*gathered, self.path, self.weight)
+        if count == 0:
+            return np.zeros(comb.size, dtype=np.complex128)
+        angle, strength = self.angle[:count], self.strength[:count]
+        paths.strengths(
+            self.path[:count], self.weight[:count], comb.turns_per_metre, comb.steps_per_metre,
+            angle, strength,
+        )  # fmt: skip
+        self.plan.setpts(angle)
+        return np.asarray(self.plan.execute(strength))
+
+
+class _Splat:
+    """The sum over facets by cubic B-splines on range bins, in single precision.
+
+    The splines' sinc^4 is divided out, so that their spectral images remain as its error: what the
+    facets return at the frequencies ``f - n P``, n != 0, where P is the bins' sampling rate. For
+    random facets that is as much as in the band, weighted ``(1 / (2 n m))^4`` at the band's edges
+    with m bins a resolution cell: -103 dB for m = 8. But at low frequencies all facets are in
+    phase, so P exceeds the highest frequency. Facets on an even grid (`facet_jitter` of 0) may echo
+    louder at such a frequency than in the band: -87 dB were seen.
+    """
+
+    def __init__(self, frequency: NDArray[np.floating]) -> None:
+        from scipy import fft
+
+        from vinsar.kernels import splat
+
+        self.comb = _Comb(frequency)
+        highest = float(frequency[-1]) / SPEED_OF_LIGHT / self.comb.steps_per_metre
+        self.period = fft.next_fast_len(math.ceil(max(8 * frequency.size, 1.2 * highest)))
+        self.modes = modes = np.arange(frequency.size) - frequency.size // 2
+        # A facet adds to the bin before its own and to three more: the bins are late by one.
+        self.correction = np.exp(2j * np.pi * modes / self.period) / (
+            np.sinc(modes / self.period) ** splat.TAPS
+        )
+        self.bins = np.empty(self.period + splat.TAPS, np.complex64)
 
     def __call__(
-        self, path: NDArray[np.floating], weight: NDArray[np.floating]
+        self,
+        facets: NDArray[np.floating],
+        amplitude: NDArray[np.floating],
+        visible: NDArray[np.bool_],
+        transmitter: NDArray[np.floating],
+        receiver: NDArray[np.floating],
+        reference: float,
     ) -> NDArray[np.complex128]:
-        if path.size == 0:
-            return np.zeros(self.count, dtype=np.complex128)
-        delay = path / SPEED_OF_LIGHT
-        cycles = self.center * delay
-        strength = weight * np.exp(-2j * np.pi * (cycles - np.rint(cycles)))
-        turns = self.step * delay
-        self.plan.setpts(2 * np.pi * (turns - np.rint(turns)))
-        return np.asarray(self.plan.execute(strength))
+        from scipy import fft
+
+        from vinsar.kernels import splat
+
+        self.bins[:] = 0
+        splat.spread(
+            facets, amplitude.astype(np.float32), visible, transmitter, receiver, reference,
+            self.comb.turns_per_metre, self.comb.steps_per_metre, self.bins,
+        )  # fmt: skip
+        self.bins[: splat.TAPS] += self.bins[self.period :]
+        spectrum = fft.fft(self.bins[: self.period])
+        return np.asarray(np.take(spectrum, self.modes, mode="wrap") * self.correction)
 
 
 def add_noise(

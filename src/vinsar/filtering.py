@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vinsar import variables
+from vinsar import blocks, variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 FilterName = Literal["goldstein", "boxcar", "none"]
 
-# Patches in one batch of transforms: 64 MB at 32 x 32 pixels.
-_PIXELS_PER_BATCH = 8_000_000
+# Patches in one batch of transforms: 4 MB, so that they stay in the cache.
+_PIXELS_PER_BATCH = 500_000
 
 
 def goldstein(
@@ -52,6 +52,8 @@ def goldstein(
     """
     from scipy import fft
 
+    from vinsar.kernels import patches as kernel
+
     if not 0 <= alpha <= 1:
         raise ValueError(f"Goldstein's alpha is {alpha}; take 0 to 1")
     if step_px < 1 or patch_px % step_px or patch_px < 2 * step_px:
@@ -70,37 +72,27 @@ def goldstein(
     windows = np.lib.stride_tricks.sliding_window_view(padded, (patch_px, patch_px))
     patches = windows[: down * step_px : step_px, : across * step_px : step_px]
     taper = np.sin(np.pi * (np.arange(patch_px) + 0.5) / patch_px).astype(np.float32) ** 2
-    weight = taper[:, None] * taper[None, :]
-    total = np.zeros_like(padded)
+    # Batches of rows of patches, each added up by itself: one result however many run at once.
     batch = max(1, _PIXELS_PER_BATCH // (across * patch_px**2))
-    for begin in range(0, down, batch):
+
+    def work(begin: int) -> NDArray[np.complex64]:
         block = patches[begin : begin + batch]
-        spectrum = fft.fft2(block, workers=-1)
-        magnitude = np.abs(spectrum)
-        # The spectrum is periodic, so its smoothing wraps around.
-        smooth = magnitude + np.roll(magnitude, 1, axis=-1) + np.roll(magnitude, -1, axis=-1)
-        smooth = smooth + np.roll(smooth, 1, axis=-2) + np.roll(smooth, -1, axis=-2)
-        peak = smooth.max(axis=(-2, -1), keepdims=True)
-        peak[peak == 0] = 1
-        spectrum *= (smooth / peak) ** np.float32(alpha)
-        filtered = fft.ifft2(spectrum, workers=-1, overwrite_x=True) * weight
-        _overlap_add(total, filtered, begin * step_px, step_px)
+        spectra = fft.fft2(block)
+        weights = np.empty(spectra.shape, np.float32)
+        kernel.smooth(spectra, weights)
+        np.power(weights, np.float32(alpha), out=weights)
+        spectra *= weights
+        band = np.zeros(((len(block) - 1) * step_px + patch_px, padded.shape[1]), np.complex64)
+        kernel.overlap_add(fft.ifft2(spectra, overwrite_x=True), taper, step_px, band)
+        return band
+
+    total = np.zeros_like(padded)
+    begins = range(0, down, batch)
+    for begin, band in zip(begins, blocks.run(work, ((n,) for n in begins)), strict=True):
+        total[begin * step_px : begin * step_px + len(band)] += band
     # Tapers squared-sine at a step that divides the patch add up to a constant.
     gain = (patch_px / (2 * step_px)) ** 2
     return np.asarray(total[lead : lead + rows, lead : lead + columns] / gain, np.complex64)
-
-
-def _overlap_add(
-    total: NDArray[np.complex64], patches: NDArray[np.complex64], first_row: int, step: int
-) -> None:
-    # One addition a place within the patch's tiling by steps, not one a patch.
-    down, across, side, _ = patches.shape
-    for row in range(0, side, step):
-        for column in range(0, side, step):
-            tile = patches[:, :, row : row + step, column : column + step]
-            plane = tile.swapaxes(1, 2).reshape(down * step, across * step)
-            top = first_row + row
-            total[top : top + down * step, column : column + across * step] += plane
 
 
 def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]:
@@ -128,7 +120,9 @@ def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]
     if window_px < 1 or window_px % 2 == 0:
         raise ValueError(f"the boxcar of {window_px} pixels must be odd and positive")
     values = np.asarray(interferogram, np.complex128)
-    return np.asarray(uniform_filter(values, window_px, mode="constant"), np.complex64)
+    sums = uniform_filter(values, window_px, mode="constant")
+    covered = [uniform_filter(np.ones(size), window_px, mode="constant") for size in values.shape]
+    return np.asarray(sums / np.outer(*covered), np.complex64)
 
 
 def apply(

@@ -109,20 +109,20 @@ def plane_wave_range_difference(
 
 
 def baseline_components(
-    baseline_m: float, baseline_angle: float, look: ArrayLike
+    baseline_m: float, baseline_angle: ArrayLike, look: ArrayLike
 ) -> tuple[Floats, Floats]:
     """Return the baseline along and across the line of sight (Eq. 4), m; angles in radians."""
-    angle = baseline_angle - np.asarray(look)
+    angle = np.asarray(baseline_angle) - np.asarray(look)
     return -baseline_m * np.sin(angle), baseline_m * np.cos(angle)
 
 
 def height_per_baseline_length(
-    range_m: ArrayLike, baseline_m: float, baseline_angle: float, look: ArrayLike
+    range_m: ArrayLike, baseline_m: float, baseline_angle: ArrayLike, look: ArrayLike
 ) -> Floats:
     """Return the height error per error of the baseline's length (Eq. 5), m/m."""
     _, across = baseline_components(baseline_m, baseline_angle, look)
     look = np.asarray(look)
-    return np.asarray(range_m) * np.sin(look) * np.sin(baseline_angle - look) / across
+    return np.asarray(range_m) * np.sin(look) * np.sin(np.asarray(baseline_angle) - look) / across
 
 
 def height_per_baseline_angle(range_m: ArrayLike, look: ArrayLike) -> Floats:
@@ -254,8 +254,8 @@ def invert_height(
     range_lower_m: ArrayLike,
     phase: ArrayLike,
     *,
-    baseline_m: float,
-    baseline_angle: float,
+    baseline_m: ArrayLike,
+    baseline_angle: ArrayLike,
     antenna_height: float,
     along_track: ArrayLike,
     wavelength_m: float,
@@ -289,13 +289,16 @@ def invert_height(
     r1 = np.asarray(range_lower_m, dtype=float)
     r2 = r1 + wavelength_m * np.asarray(phase) / (4 * np.pi)
     across_range = np.sqrt(r1**2 - np.asarray(along_track) ** 2)
+    baseline_m, baseline_angle = np.asarray(baseline_m), np.asarray(baseline_angle)
     sine = (r2**2 - r1**2 - baseline_m**2) / (2 * across_range * baseline_m)
-    angle = np.arcsin(np.where(np.abs(sine) <= 1, sine, np.nan))
-    # arcsin knows the angle up to its mirror image; level ground at this range tells which side.
-    ground_look = np.arccos(np.clip(antenna_height / across_range, -1, 1))
-    angle = np.where(np.cos(baseline_angle - ground_look) < 0, np.pi - angle, angle)
-    look = baseline_angle - angle
-    return antenna_height - across_range * np.cos(look)
+    cosine = np.sqrt(np.where(np.abs(sine) <= 1, 1 - sine**2, np.nan))
+    # The sine knows the angle up to its mirror image; level ground at this range tells which side.
+    ground_cosine = np.clip(antenna_height / across_range, -1, 1)
+    ground_sine = np.sqrt(1 - ground_cosine**2)
+    across, up = np.cos(baseline_angle), np.sin(baseline_angle)
+    cosine = np.where(across * ground_cosine + up * ground_sine < 0, -cosine, cosine)
+    # The look angle is beta less this angle.
+    return antenna_height - across_range * (across * cosine + up * sine)
 
 
 def printed_height(

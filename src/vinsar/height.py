@@ -155,21 +155,24 @@ def code_dem(
     -------
     ndarray, shape (y, x)
         Heights on the grid, m; NaN more than a pixel beyond the outermost known height.
+
+    Raises
+    ------
+    ValueError
+        If the heights are not on the axes.
     """
+    from vinsar.kernels import columns
+
+    if image_height.shape != (y.size, x.size):
+        raise ValueError(
+            f"heights of shape {image_height.shape} are not on a grid of {(y.size, x.size)}"
+        )
+
     true_y = antenna_y + geometry.circle_true_y(
         y[:, None] - antenna_y, image_height, antenna_height
     )
-    spacing = y[1] - y[0]
-    result = np.full_like(image_height, np.nan)
-    for column in range(x.size):
-        known = np.isfinite(true_y[:, column])
-        if not known.any():
-            continue
-        order = np.argsort(true_y[known, column], kind="stable")
-        place = true_y[known, column][order]
-        result[:, column] = np.interp(y, place, image_height[known, column][order])
-        beyond = (y < place[0] - spacing) | (y > place[-1] + spacing)
-        result[beyond, column] = np.nan
+    result = np.empty(image_height.shape)
+    columns.resample(np.ascontiguousarray(image_height, float), true_y, y, result)
     return result
 
 

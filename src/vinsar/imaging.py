@@ -158,7 +158,7 @@ def backproject(
         If profiles and trajectory differ in their positions, or the profiles do not cover the
         grid.
     """
-    from vinsar.kernels import backprojection
+    from vinsar.kernels import backprojection, rail
 
     samples = profiles["profile"].values
     transmitter, receiver = trajectory_["transmitter"].values, trajectory_["receiver"].values
@@ -184,16 +184,24 @@ def backproject(
     for part, values in zip(parts, (samples.real, samples.imag), strict=True):
         part[..., : slant_range.size] = values * weights[:, None].astype(np.float32)
     surface = np.ascontiguousarray(np.broadcast_to(np.asarray(z, dtype=float), (y.size, x.size)))
+    rails = [_rail(x, surface, *ends) for ends in zip(transmitter, receiver, strict=True)]
     carrier = float(profiles["carrier_frequency"])
     image = np.zeros((samples.shape[0], y.size, x.size), dtype=np.complex64)
+    sampling = float(slant_range[0]), spacing, 2 * carrier / SPEED_OF_LIGHT, cubic
 
     def work(channel: int, begin: int) -> None:
         rows = slice(begin, begin + _ROWS_PER_BLOCK)
-        backprojection.accumulate(
-            image[channel, rows], x, y[rows], surface[rows], transmitter[channel],
-            receiver[channel], parts[0, channel], parts[1, channel], float(slant_range[0]), spacing,
-            2 * carrier / SPEED_OF_LIGHT, cubic,
-        )  # fmt: skip
+        out, back, regular = transmitter[channel], receiver[channel], rails[channel]
+        data = parts[0, channel], parts[1, channel], *sampling
+        if regular is None:
+            backprojection.accumulate(
+                image[channel, rows], x, y[rows], surface[rows], out, back, *data
+            )
+        else:
+            rail.accumulate(
+                image[channel, rows], x[0], (x[-1] - x[0]) / (x.size - 1), y[rows],
+                np.ascontiguousarray(surface[rows, 0]), out[0], back[0], *regular, *data,
+            )  # fmt: skip
 
     blocks.run(
         work,
@@ -213,3 +221,26 @@ def backproject(
         },
         {"channel": profiles["channel"].values, "x": x, "y": y},
     )
+
+
+def _rail(
+    x: NDArray[np.floating],
+    surface: NDArray[np.floating],
+    transmitter: NDArray[np.floating],
+    receiver: NDArray[np.floating],
+) -> tuple[float, int, int] | None:
+    """Return the positions' pitch, classes and stride as `kernels.rail` takes them, if it can."""
+    if x.size < 2 or len(transmitter) < 2 or np.ptp(surface, axis=1).any():
+        return None
+    spacing = (x[-1] - x[0]) / (x.size - 1)
+    pitch = (transmitter[-1, 0] - transmitter[0, 0]) / (len(transmitter) - 1)
+    if pitch <= 0:
+        return None
+    classes, stride = max(1, round(spacing / pitch)), max(1, round(pitch / spacing))
+    shift = pitch * np.arange(len(transmitter))[:, None] * np.array([1.0, 0.0, 0.0])
+    places = [(transmitter, transmitter[0] + shift), (receiver, receiver[0] + shift)]
+    grid = (x, x[0] + spacing * np.arange(x.size))
+    # Rounding of coordinates is allowed for: a nanometre is a millionth of a cycle.
+    even = all(np.abs(found - expected).max() < 1e-9 for found, expected in [*places, grid])
+    last = (len(transmitter) - 1) * abs(spacing / classes - pitch / stride)
+    return (pitch, classes, stride) if even and last < 1e-9 else None

@@ -35,24 +35,15 @@ def coherence(
     ValueError
         If the window is not odd and positive.
     """
-    from scipy.ndimage import correlate1d
+    from vinsar.kernels import multilook
 
     if window_px < 1 or window_px % 2 == 0:
         raise ValueError(f"the coherence window of {window_px} pixels must be odd and positive")
-    box = np.full(window_px, 1.0 / window_px)
-
-    def multilook(values: NDArray[np.floating]) -> NDArray[np.floating]:
-        rows = correlate1d(values, box, axis=0, mode="constant")
-        return np.asarray(correlate1d(rows, box, axis=1, mode="constant"))
-
-    product = np.asarray(lower, np.complex128) * np.conj(upper)
-    cross = np.hypot(multilook(product.real), multilook(product.imag))
-    power = multilook(np.abs(lower).astype(float) ** 2) * multilook(
-        np.abs(upper).astype(float) ** 2
+    result = np.empty(lower.shape)
+    multilook.coherence(
+        np.ascontiguousarray(lower), np.ascontiguousarray(upper), window_px // 2, result
     )
-    result = np.zeros_like(power)
-    np.divide(cross, np.sqrt(power), out=result, where=power > 0)
-    return np.clip(result, 0.0, 1.0)
+    return result
 
 
 def form(images: xr.Dataset, *, coherence_window_px: int) -> xr.Dataset:

@@ -15,6 +15,7 @@ import xarray as xr
 
 from vinsar import (
     accuracy,
+    baseline,
     config,
     echo,
     filtering,
@@ -45,7 +46,7 @@ logger = logging.getLogger(__name__)
 Products = dict[str, "xr.Dataset"]
 
 # What a random draw is for; the number is part of its seed and never changes.
-_JITTER, _NOISE, _MOTION = 0, 1, 2
+_JITTER, _NOISE, _MOTION, _BASELINE = 0, 1, 2, 3
 
 # Slant range by which the profiles exceed the image: position errors shall not need new ones.
 _PROFILE_MARGIN_M = 0.5
@@ -216,6 +217,7 @@ def _profiles(products: Products, study: config.Study) -> xr.Dataset:
         far_range_m=far + _PROFILE_MARGIN_M,
         window=study.imaging.range_window,
         oversampling=study.imaging.oversampling,
+        interpolation=study.imaging.interpolation,
     )
 
 
@@ -307,6 +309,19 @@ def _focus(products: Products, study: config.Study) -> xr.Dataset:
     return variables.dataset("focus", {"point_gain": gain})
 
 
+def _baseline_angle(products: Products, study: config.Study) -> xr.Dataset:
+    del products
+    options = study.baseline_errors
+    return baseline.angle_errors(
+        baseline.view(study.radar, study.scene),
+        baseline_m=study.radar.baseline_m,
+        length_std_m=options.length_std_m,
+        angle_std_deg=options.angle_std_deg,
+        draws=options.draws,
+        rng=_rng(study, _BASELINE),
+    )
+
+
 def _registration(products: Products, study: config.Study) -> xr.Dataset:
     antennas = products["trajectory"]
     frequency = _frequency(study)
@@ -323,6 +338,7 @@ def _registration(products: Products, study: config.Study) -> xr.Dataset:
             far_range_m=far + _POINT_MARGIN_M,
             window=study.imaging.range_window,
             oversampling=study.imaging.oversampling,
+            interpolation=study.imaging.interpolation,
         )
 
         def focus(x: Floats, y: Floats) -> NDArray[np.complexfloating]:
@@ -410,7 +426,7 @@ STAGES: dict[str, Stage] = {
     "profiles": Stage(
         _profiles,
         ("received", "trajectory"),
-        (*_GRID, "imaging.range_window", "imaging.oversampling"),
+        (*_GRID, "imaging.range_window", "imaging.oversampling", "imaging.interpolation"),
         ("imaging", "trajectory"),
     ),
     "recorded_trajectory": Stage(
@@ -456,6 +472,9 @@ STAGES: dict[str, Stage] = {
             "registration",
         ),
         ("registration", "echo", "imaging"),
+    ),
+    "baseline_angle": Stage(
+        _baseline_angle, (), (*_DRAWS, "radar", "scene", "baseline_errors"), ("baseline",)
     ),
 }
 """The chain; a stage makes the product of its name. What sweeps change least comes first."""

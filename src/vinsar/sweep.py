@@ -1,8 +1,8 @@
 """Sweeps: every combination of keys of the configuration, each repeated, on Dask.
 
 A case is a study. What its stages have in common with another case is computed once: a stage's
-product is kept under its name, the keys of the configuration that it declares, and the contents of
-its inputs, by channel where the stage works by channel. Nothing here knows what is swept.
+product is kept under its name, the keys of the configuration that it declares, and its inputs, by
+channel where the stage works by channel. Nothing here knows what is swept.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import hashlib
 import json
 import logging
 import threading
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -24,14 +24,32 @@ from vinsar import blocks, config, pipeline, validation, variables
 from vinsar.constants import CHANNELS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     Row = dict[str, Any]
+    Results = tuple[dict[str, Row], dict[str, str]]
+    Compute = Callable[
+        [
+            Callable[[list["Case"]], Results],
+            list[list["Case"]],
+            Callable[[Results], None],
+            Callable[[list["Case"], str], None],
+        ],
+        None,
+    ]
 
 logger = logging.getLogger(__name__)
 
 CASES_PER_BLOCK = 15
-"""Cases that a worker takes at a time, and at most lose when it dies."""
+"""Cases that a worker takes at a time, and at most loses when it dies."""
+
+# Fewer cases a block where there are few, so that every worker has work to the end.
+_LEAST_BLOCKS = 64
+
+# Products up to this size are told apart by their numbers, which costs 0.1 ms at most: what comes
+# out alike for other keys (positions without errors, one channel's antennas) is then known to be.
+# Larger ones, images above all, are told apart by what they were made from.
+_SMALL_BYTES = 1 << 16
 
 _RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
 _STATISTICS = (
@@ -86,7 +104,7 @@ def _digest(*parts: str | bytes) -> str:
 
 
 def _text(value: Any) -> str:
-    return json.dumps(value, sort_keys=True)
+    return json.dumps(value, sort_keys=True, default=str)
 
 
 def declared() -> list[str]:
@@ -94,6 +112,32 @@ def declared() -> list[str]:
     return list(
         dict.fromkeys(name for s in pipeline.needed(_RESULTS).values() for name in s.sections)
     )
+
+
+def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config.Study]]:
+    """Return a sweep's studies, all checked, each with its swept keys and their values.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+
+    Returns
+    -------
+    list of tuple
+        The product of the swept values, the last key fastest.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If a swept key changes nothing, or one of them is not a valid study.
+    """
+    _refuse_idle(name, study.sweeps[name])
+    return [
+        (changes, _share(case, study)) for changes, case in validation.sweep_studies(study, name)
+    ]
 
 
 def cases(study: config.Study, name: str) -> list[Case]:
@@ -114,61 +158,94 @@ def cases(study: config.Study, name: str) -> list[Case]:
     Raises
     ------
     validation.ConfigurationError
-        If any case is not a valid study; nothing has run then.
+        If a swept key changes nothing, or any case is not a valid study; nothing has run then.
     """
     sweep = study.sweeps[name]
-    studies = validation.sweep_studies(study, name)
+    names = declared()
     shape = [len(values) for values in sweep.over.values()]
     sections = [stage.sections for stage in pipeline.needed(_RESULTS).values()]
-    found = []
-    for index, (changes, case) in zip(np.ndindex(*shape), studies, strict=True):
-        for realization in range(sweep.realizations):
-            one = case.model_copy(update={"realization": realization})
-            key = _digest(_text(one.values(declared())))
-            found.append(Case((*index, realization), changes, one, key))
     # What the first stages read changes slowest, so that few of their products are kept at a time.
-    order: list[dict[str, int]] = [{} for _ in sections]
+    seen: list[dict[str, int]] = [{} for _ in sections]
+    found = []
+    for index, (changes, case) in zip(np.ndindex(*shape), studies(study, name), strict=True):
+        values = case.values(names)
+        for realization in range(sweep.realizations):
+            values["realization"] = realization
+            texts = (_text({key: values[key] for key in part}) for part in sections)
+            rank = [
+                known.setdefault(text, len(known)) for known, text in zip(seen, texts, strict=True)
+            ]
+            one = case.model_copy(update={"realization": realization})
+            key = _digest(_text(values))
+            found.append((rank, Case((*index, realization), changes, one, key)))
+    found.sort(key=lambda item: item[0])
+    return [case for _, case in found]
 
-    def rank(case: Case) -> tuple[int, ...]:
-        texts = [_text(case.study.values(names)) for names in sections]
-        return tuple(
-            seen.setdefault(text, len(seen)) for seen, text in zip(order, texts, strict=True)
-        )
 
-    return sorted(found, key=rank)
+def _refuse_idle(name: str, sweep: config.Sweep) -> None:
+    """Refuse swept keys that no stage of a case reads, and values that stand there twice."""
+    faults = []
+    read = [f"{key}." for key in declared()]
+    for key, values in sweep.over.items():
+        where = f"sweeps.{name}.over.{key}"
+        if key == "realization":
+            advice = f"is counted by sweeps.{name}.realizations; take it out of `over`"
+            faults.append(validation.Fault(where, None, advice))
+        # A key that is not there at all is for the check of the cases, which says what was meant.
+        elif key in validation.every_key() and not any(
+            f"{key}.".startswith(part) or part.startswith(f"{key}.") for part in read
+        ):
+            advice = "no stage of a case reads it, so all its values would give the same result"
+            faults.append(validation.Fault(where, None, advice))
+        count = Counter(_text(float(v) if _is_number(v) else v) for v in values)
+        twice = [text for text, times in count.items() if times > 1]
+        if twice:
+            faults.append(validation.Fault(where, ", ".join(twice), "stands there more than once"))
+    if faults:
+        raise validation.ConfigurationError(faults)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _share(case: config.Study, study: config.Study) -> config.Study:
+    """Return a case that holds the study's own sections where they are equal: less memory."""
+    same = {name: getattr(study, name) for name in type(study).model_fields}
+    return case.model_copy(
+        update={name: part for name, part in same.items() if getattr(case, name) == part}
+    )
 
 
 class _Product:
-    """A stage's product with the digest of its numbers, whole and by channel."""
+    """A stage's product with what tells it from others, whole and by channel."""
 
-    def __init__(self, parts: list[xr.Dataset]) -> None:
-        self._parts = [(part, _contents(part)) for part in parts]
+    def __init__(self, parts: list[tuple[xr.Dataset, str]]) -> None:
+        self.parts = parts
         self._whole: tuple[xr.Dataset, str] | None = None
         self._channels: list[tuple[xr.Dataset, str]] | None = None
 
-    @classmethod
-    def of_channels(cls, products: list[_Product]) -> _Product:
-        made = cls([])
-        made._parts = [product._parts[0] for product in products]
-        return made
-
     def whole(self) -> tuple[xr.Dataset, str]:
         if self._whole is None:
-            self._whole = self._parts[0]
-            if len(self._parts) > 1:
-                joined = pipeline.join_channels([part for part, _ in self._parts])
-                self._whole = joined, _digest(*(digest for _, digest in self._parts))
+            whole = self.parts[0]
+            if len(self.parts) > 1:
+                joined = pipeline.join_channels([part for part, _ in self.parts])
+                whole = joined, _digest(*(name for _, name in self.parts))
+            self._whole = whole
         return self._whole
 
     def channel(self, index: int) -> tuple[xr.Dataset, str]:
-        if len(self._parts) > 1:
-            return self._parts[index]
-        whole = self._parts[0][0]
-        if "channel" not in whole.dims:
-            return self._parts[0]
+        if len(self.parts) > 1:
+            return self.parts[index]
+        data, name = self.parts[0]
+        if "channel" not in data.dims:
+            return self.parts[0]
         if self._channels is None:
-            split = [pipeline.split_channel({"": whole}, name)[""] for name in CHANNELS]
-            self._channels = [(part, _contents(part)) for part in split]
+            split = [pipeline.split_channel({"": data}, label)[""] for label in CHANNELS]
+            self._channels = [
+                (part, _identity(part, _digest(name, label)))
+                for part, label in zip(split, CHANNELS, strict=True)
+            ]
         return self._channels[index]
 
 
@@ -178,7 +255,8 @@ class Memo:
     Parameters
     ----------
     capacity
-        How many products of a stage (and channel) are kept.
+        How many products of a stage (and channel) are kept, at least; as many threads as ever work
+        at once have two each.
 
     Attributes
     ----------
@@ -186,35 +264,53 @@ class Memo:
         How often each stage (and channel) has been computed.
     """
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int = 4) -> None:
         self._capacity = capacity
+        self._active = 0
         self._lock = threading.Lock()
         self._kept: dict[str, OrderedDict[str, Future[_Product]]] = {}
         self.computed: dict[str, int] = {}
 
+    def kept(self) -> dict[str, int]:
+        """Return how many products of each stage (and channel) are kept."""
+        with self._lock:
+            return {name: len(products) for name, products in self._kept.items()}
+
     def products(self, names: Iterable[str], study: config.Study) -> pipeline.Products:
         """Return products for a study, computing only what is not kept."""
+        with self._lock:
+            self._active += 1
+            self._capacity = max(self._capacity, 2 * self._active)
+        try:
+            return self._products(tuple(names), study)
+        finally:
+            with self._lock:
+                self._active -= 1
+
+    def _products(self, wanted: tuple[str, ...], study: config.Study) -> pipeline.Products:
         made: dict[str, _Product] = {}
-        wanted = tuple(names)
-        for name, stage in pipeline.needed(wanted).items():
-            setting = study.values(stage.sections)
+        stages = pipeline.needed(wanted)
+        values = study.values({name for stage in stages.values() for name in stage.sections})
+        for name, stage in stages.items():
+            setting = {key: values[key] for key in stage.sections}
+            text = _text(setting)
             compute = partial(_compute, stage, setting)
             inputs = {key: made[key] for key in stage.inputs}
             if stage.by_channel:
-                made[name] = _Product.of_channels(
+                made[name] = _Product(
                     [
                         self._get(
                             f"{name}/{label}",
-                            _text(setting),
+                            text,
                             {key: product.channel(index) for key, product in inputs.items()},
                             compute,
-                        )
+                        ).parts[0]
                         for index, label in enumerate(CHANNELS)
                     ]
                 )
             else:
                 whole = {key: product.whole() for key, product in inputs.items()}
-                made[name] = self._get(name, _text(setting), whole, compute)
+                made[name] = self._get(name, text, whole, compute)
         return {name: made[name].whole()[0] for name in wanted}
 
     def _get(
@@ -224,7 +320,7 @@ class Memo:
         inputs: Mapping[str, tuple[xr.Dataset, str]],
         compute: Callable[[pipeline.Products], xr.Dataset],
     ) -> _Product:
-        key = _digest(setting, *(digest for _, digest in inputs.values()))
+        key = _digest(name, setting, *(origin for _, origin in inputs.values()))
         with self._lock:
             kept = self._kept.setdefault(name, OrderedDict())
             future = kept.get(key)
@@ -239,7 +335,7 @@ class Memo:
         if mine:
             try:
                 product = compute({label: data for label, (data, _) in inputs.items()})
-                future.set_result(_Product([product]))
+                future.set_result(_Product([(product, _identity(product, key))]))
             except BaseException as error:
                 with self._lock:
                     kept.pop(key, None)
@@ -253,18 +349,24 @@ def _compute(
     return stage.compute(products, config.Study.part(setting))
 
 
-def _contents(product: xr.Dataset) -> str:
-    """Return the digest of a product's numbers."""
+def _identity(product: xr.Dataset, origin: str) -> str:
+    """Return what tells a product from others: its numbers if they are few, else its origin."""
+    if product.nbytes > _SMALL_BYTES:
+        return origin
     parts: list[str | bytes] = []
-    for name in sorted(map(str, product.variables)):
-        values = product.variables[name].values
-        text = values.dtype.kind in "UO"
-        parts += [name, str(values.shape), _text(values.tolist()) if text else values.tobytes()]
+    for name, variable in sorted(product.variables.items(), key=lambda item: str(item[0])):
+        values = variable.values
+        labels = values.dtype.kind in "UO"
+        parts += [
+            str(name),
+            f"{variable.dims} {values.dtype} {values.shape} {variable.attrs}",
+            _text(values.tolist()) if labels else values.tobytes(),
+        ]
     return _digest(*parts)
 
 
-# One a process: threads share it, and so do a worker's tasks. Two generations a thread suffice.
-_MEMO = Memo(capacity=8)
+# One a process: threads share it, and so do a worker's tasks.
+_MEMO = Memo()
 
 
 def run_case(case: Case, memo: Memo | None = None) -> Row:
@@ -295,7 +397,7 @@ def run_case(case: Case, memo: Memo | None = None) -> Row:
     return row
 
 
-def _run_block(block: list[Case]) -> tuple[dict[str, Row], dict[str, str]]:
+def _run_block(block: list[Case]) -> Results:
     rows, errors = {}, {}
     for case in block:
         try:
@@ -312,7 +414,7 @@ def run(
     finished: Mapping[str, Row],
     keep: Callable[[dict[str, Row]], None],
     progress: Callable[[int, int], None],
-    compute: Callable[[Callable[[list[Case]], Any], list[list[Case]], Callable[[Any], None]], None],
+    compute: Compute,
 ) -> xr.Dataset:
     """Run a sweep.
 
@@ -329,8 +431,10 @@ def run(
     progress
         Called with the number of finished cases and of all.
     compute
-        Runs a function on blocks of cases, in parallel, and calls another with what it returns,
-        in this thread and in any order (`cluster.workers`).
+        ``compute(function, blocks, receive, lost)`` runs the function on each block of cases, in
+        parallel, and calls, in this thread and in any order, ``receive`` with what it returns, or
+        ``lost`` with a block that could not be run and a sentence that says why
+        (`cluster.workers`).
 
     Returns
     -------
@@ -351,14 +455,18 @@ def run(
     progress(len(rows), len(everything))
     errors: dict[str, str] = {}
 
-    def receive(block: tuple[dict[str, Row], dict[str, str]]) -> None:
+    def receive(block: Results) -> None:
         done, failed = block
         keep(done)
         rows.update(done)
         errors.update(failed)
         progress(len(rows) + len(errors), len(everything))
 
-    compute(_run_block, list(_blocks(waiting)), receive)
+    def lost(block: list[Case], reason: str) -> None:
+        receive(({}, {case.key: reason for case in block}))
+
+    if waiting:
+        compute(_run_block, _blocks(waiting), receive, lost)
     if errors:
         listed = [f"{case}: {errors[case.key]}" for case in everything if case.key in errors]
         shown = "".join(f"\n  {line}" for line in listed[:10])
@@ -370,9 +478,9 @@ def run(
     return _assemble(study.sweeps[name], everything, rows)
 
 
-def _blocks(waiting: list[Case]) -> Iterator[list[Case]]:
-    for begin in range(0, len(waiting), CASES_PER_BLOCK):
-        yield waiting[begin : begin + CASES_PER_BLOCK]
+def _blocks(waiting: list[Case]) -> list[list[Case]]:
+    size = min(CASES_PER_BLOCK, max(1, len(waiting) // _LEAST_BLOCKS))
+    return [waiting[begin : begin + size] for begin in range(0, len(waiting), size)]
 
 
 def dimension(key: str) -> str:
@@ -393,8 +501,9 @@ def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Ro
     swept = {}
     for key, listed in sweep.over.items():
         unit = _UNITS.get(key.rpartition("_")[2], "1")
-        numeric = all(isinstance(v, int | float) and not isinstance(v, bool) for v in listed)
+        numeric = all(_is_number(value) for value in listed)
         attrs = {"long_name": key} | ({"units": unit} if numeric else {})
-        labels = np.asarray(listed) if numeric else np.asarray([str(v) for v in listed])
+        texts = [value if isinstance(value, str) else _text(value) for value in listed]
+        labels = np.asarray(listed if numeric else texts)
         swept[dimension(key)] = (labels, attrs)
     return variables.sweep_dataset(data, swept)

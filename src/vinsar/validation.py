@@ -11,6 +11,7 @@ import itertools
 import re
 import typing
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -282,6 +283,12 @@ def _nearest(path: str) -> str:
             return f"; did you mean {candidates[close[0]]}?"
     listed = ", ".join(key.rpartition(".")[2] for key in siblings)
     return f"; there are {listed}" if listed else ""
+
+
+@cache
+def every_key() -> frozenset[str]:
+    """Return every key of the configuration, dotted, sections among them."""
+    return frozenset(_keys(config.Study))
 
 
 def _keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:

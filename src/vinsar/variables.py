@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -16,7 +17,15 @@ from vinsar.constants import AXES, CHANNELS, REGIONS
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from numpy.typing import NDArray
+    from xarray.core.indexes import Index
+
+    _Coordinate = tuple[xr.Variable, Index]
+
 Kind = Literal["real", "complex", "integer", "flag", "label"]
+
+# Longer axes, such as that of the facets, are not remembered.
+_LONG_AXIS = 4096
 
 DTYPES: dict[Kind, tuple[str, ...]] = {
     "real": ("float32", "float64"),
@@ -91,6 +100,9 @@ COORDINATES: dict[str, Variable] = {
     "target": Variable(("target",), "label", "", "point target"),
     "target_height": Variable(("target_height",), "real", "m", "height of the point target"),
     "region": Variable(("region",), "label", "", "part of the scene"),
+    "baseline_angle": Variable(
+        ("baseline_angle",), "real", "radian", "attitude of the baseline from horizontal"
+    ),
     "realization": Variable(("realization",), "integer", "1", "number of the realization"),
 }
 
@@ -299,6 +311,46 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
         ),
         "map_height": Variable((), "real", "m", "target height of the maps"),
     },
+    "baseline_angle": {
+        "length_drawn": Variable(
+            ("baseline_angle",),
+            "real",
+            "m",
+            "standard deviation of the height under drawn errors of the baseline's length",
+            "by the exact inversion",
+        ),
+        "length_eq5": Variable(
+            ("baseline_angle",),
+            "real",
+            "m",
+            "standard deviation of the height from the baseline's length by Eq. 5",
+        ),
+        "length_exact": Variable(
+            ("baseline_angle",),
+            "real",
+            "m",
+            "standard deviation of the height from the baseline's length by the exact derivative",
+        ),
+        "angle_drawn": Variable(
+            ("baseline_angle",),
+            "real",
+            "m",
+            "standard deviation of the height under drawn errors of the baseline's attitude",
+            "by the exact inversion",
+        ),
+        "angle_eq12": Variable(
+            ("baseline_angle",),
+            "real",
+            "m",
+            "standard deviation of the height from the baseline's attitude by Eq. 12",
+        ),
+        "length_error": Variable(
+            (), "real", "m", "standard deviation of the error of the baseline's length"
+        ),
+        "angle_error": Variable(
+            (), "real", "radian", "standard deviation of the error of the baseline's attitude"
+        ),
+    },
 }
 
 SWEEP: dict[str, Variable] = {
@@ -361,10 +413,34 @@ def dataset(
             values = np.asarray(coords[name])
         else:
             values = np.asarray(LABELS[name] if name in LABELS else np.arange(sizes[name]))
-        labels[name] = (name, values, COORDINATES[name].attrs)
-    result = xr.Dataset(contents, labels)
+        labels[name] = _coordinate(name, values)
+    result = xr.Dataset(
+        contents,
+        xr.Coordinates(
+            # Copies, because a dataset's owner may change its attributes.
+            {name: variable.copy(deep=False) for name, (variable, _) in labels.items()},
+            {name: index for name, (_, index) in labels.items()},
+        ),
+    )
     check(result, product)
     return result
+
+
+def _coordinate(name: str, values: NDArray[Any]) -> _Coordinate:
+    # Making an index costs more than all else here, and the same few axes come again and again.
+    if values.size > _LONG_AXIS:
+        return _make_coordinate(name, values)
+    return _remembered_coordinate(name, values.dtype.str, values.tobytes())
+
+
+@lru_cache(maxsize=128)
+def _remembered_coordinate(name: str, dtype: str, data: bytes) -> _Coordinate:
+    return _make_coordinate(name, np.frombuffer(data, dtype).copy())
+
+
+def _make_coordinate(name: str, values: NDArray[Any]) -> _Coordinate:
+    made = xr.Coordinates({name: (name, values, COORDINATES[name].attrs)})
+    return made.variables[name], made.xindexes[name]
 
 
 def sweep_dataset(
@@ -398,6 +474,36 @@ def sweep_dataset(
     for name, labels in coords.items():
         result = result.assign_coords({name: (name, labels, COORDINATES[name].attrs)})
     return result
+
+
+def swept(data: xr.Dataset, *dims: str) -> xr.Dataset:
+    """Return a sweep over some of its keys, each of its other keys at its first value.
+
+    Parameters
+    ----------
+    data
+        Product ``sweep``.
+    *dims
+        Dimensions to keep; the realization and the variables' own stay as they are.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``sweep`` with no other swept key.
+
+    Raises
+    ------
+    ValueError
+        If the sweep does not go over one of them.
+    """
+    own = {"realization", *(dim for variable in SWEEP.values() for dim in variable.dims)}
+    keys = [str(dim) for dim in data.dims if dim not in own]
+    missing = [dim for dim in dims if dim not in keys]
+    if missing:
+        raise ValueError(
+            f"the sweep goes over {', '.join(keys)}; {', '.join(missing)} is needed as well"
+        )
+    return data.isel({dim: 0 for dim in keys if dim not in dims}, drop=True)
 
 
 def check(data: xr.Dataset, product: str) -> None:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
 
+# Where the raster is coarse, the edges of shadows still are to be sharp.
+_FEWEST_RAYS = 800
+
 
 def visible_points(terrain: xr.Dataset, antennas: Floats, points: Floats) -> Flags:
     """Return which points the terrain leaves in sight of each antenna.
@@ -36,29 +39,34 @@ def visible_points(terrain: xr.Dataset, antennas: Floats, points: Floats) -> Fla
     Raises
     ------
     ValueError
-        If an antenna is not before the terrain, or the points are not sorted by y.
+        If an antenna is not before the terrain, a position is not finite, or the points are not
+        sorted by y.
     """
     from vinsar.kernels import fan
 
     x, y = terrain["x"].values, terrain["y"].values
-    height = np.ascontiguousarray(terrain["height"].values, dtype=float)
+    height = np.pad(
+        terrain["height"].values.astype(np.float32), ((0, 0), (0, fan.PADDING)), mode="edge"
+    )
     if antennas[:, 1].max() >= y[0]:
         raise ValueError(
             f"an antenna at y = {antennas[:, 1].max():.3f} m is not before the terrain, which "
             f"begins at y = {y[0]:.3f} m"
         )
+    if not (np.isfinite(antennas).all() and np.isfinite(points).all()):
+        raise ValueError("an antenna or a point is at a position that is not a number")
     if np.any(np.diff(points[:, 1]) < 0):
         raise ValueError("the points are not sorted by y")
-    points = np.ascontiguousarray(points, dtype=float)
+    columns = np.ascontiguousarray(points.T, dtype=float)
     visible = np.empty((len(antennas), len(points)), dtype=bool)
     # Rays a raster cell apart at the far edge, where they are widest apart.
     spread = (x[-1] - x[0]) / (y[0] - antennas[:, 1].max())
     spacing = (x[1] - x[0]) / (y[-1] - antennas[:, 1].min())
-    rays = max(2, int(np.ceil(spread / spacing)) + 1)
+    rays = max(_FEWEST_RAYS, int(np.ceil(spread / spacing)) + 1)
 
     def work(index: int) -> None:
         fan.sweep(
-            height, x[0], x[1] - x[0], y[0], y[1] - y[0], antennas[index], points, rays,
+            height, x[0], x[1] - x[0], y[0], y[1] - y[0], antennas[index], columns, rays,
             visible[index],
         )  # fmt: skip
 

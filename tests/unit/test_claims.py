@@ -1,9 +1,10 @@
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vinsar import claims, pipeline, validation
+from vinsar import claims, pipeline, validation, variables
 
 ROOT = Path(__file__).parents[2]
 
@@ -15,7 +16,36 @@ def study():
 
 @pytest.fixture(scope="module")
 def products(study):
-    return pipeline.run(study)
+    return pipeline.run(study) | {"sweeps/vibration": shaken()}
+
+
+LEVELS = [0.0, 0.1, 0.5, 1.0, 2.0, 4.0]
+# Height stds in metres by axis: as the paper claims them, over a relief of some 9 cm.
+AS_CLAIMED = {
+    "x": [0.02, 0.02, 0.025, 0.03, 0.04, 0.041],
+    "y": [0.02, 0.045, 0.08, 0.095, 0.1, 0.1],
+    "z": [0.02, 0.021, 0.03, 0.035, 0.042, 0.043],
+}
+
+
+def shaken(levels=LEVELS, scatter=0.0, **curves):
+    """Make the sweep of Fig. 5 from a std by axis and level; independent errors do ten times."""
+    axes = AS_CLAIMED | curves
+    realizations = np.array([1 - scatter, 1.0, 1 + scatter])
+    one = np.array([list(axes[name]) for name in "xyz"])[:, :, None] * realizations
+    std = np.stack([one, 10 * one])
+    data = {}
+    for name, variable in variables.SWEEP.items():
+        values = std
+        for size in (3 if dim == "region" else 2 for dim in variable.dims):
+            values = np.repeat(values[..., None], size, axis=-1)
+        data[name] = values.astype(int) if name == "residues" else values
+    swept = {
+        "motion_channels": (np.array(["common", "independent"]), {}),
+        "motion_axis": (np.array(list("xyz")), {}),
+        "motion_level_wavelengths": (np.array(levels), {}),
+    }
+    return variables.sweep_dataset(data, swept)
 
 
 def verdicts(products, study):
@@ -29,16 +59,17 @@ def replaced(products, product, **values):
     return products | {product: other}
 
 
-def test_every_claim_of_figures_2_to_4_is_decided(products, study):
+def test_every_claim_of_figures_2_to_5_is_decided(products, study):
     assert list(verdicts(products, study)) == [
         "F2-sign", "F2-centre", "F2-near-far", "S12-vertical", "S12-critical", "F3-speckle",
-        "F3-unwrapped", "F4-95", "F4-std", "F4-max", "F4-alarm",
+        "F3-unwrapped", "F4-95", "F4-std", "F4-max", "F4-alarm", "F5-y", "F5-xz", "F5-bounded",
     ]  # fmt: skip
 
 
 def test_claims_read_no_section_but_the_declared(products, study):
     part = study.part({name: getattr(study, name) for name in claims.SECTIONS})
-    needed = {name: products[name] for name in claims.INPUTS}
+    names = [*claims.INPUTS, *(f"sweeps/{name}" for name in claims.SWEEPS)]
+    needed = {name: products[name] for name in names}
     assert claims.as_json(claims.evaluate(needed, part)) == claims.as_json(
         claims.evaluate(products, study)
     )
@@ -50,9 +81,7 @@ def test_the_registration_claims_fall_with_the_measurement(products, study):
     assert found["F2-sign"].verdict == "reproduced"
     assert found["F2-centre"].verdict == "contradicted"
     # A radar whose targets moved radially, as Eqs. 6-7 have it, would reproduce them.
-    radial = verdicts(
-        replaced(products, "registration", measured=shifts["radial"].values), study
-    )
+    radial = verdicts(replaced(products, "registration", measured=shifts["radial"].values), study)
     assert radial["F2-centre"].verdict == "reproduced"
     mirrored = verdicts(
         replaced(products, "registration", measured=-shifts["measured"].values), study
@@ -105,6 +134,85 @@ def test_the_vertical_baseline_is_as_sensitive_as_eq_5_says(products, study):
     figures = verdicts(products, study)["S12-vertical"].figures
     # Eq. 5 at beta = 90 deg is (H0 - h) / B; the exact geometry adds half a baseline to H0.
     assert figures["vertical_m_per_m"] == pytest.approx((2.0 + 0.3) / 0.3, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def shaking(products, study):
+    """Return the verdicts of Fig. 5's claims for a sweep, over a relief of 9 cm std."""
+    truth = products["truth"].copy(deep=True)
+    height = truth["height"].values
+    truth["height"].values[:] = (height - height.mean()) / height.std() * 0.09
+
+    def decide(sweep):
+        found = verdicts(products | {"truth": truth, "sweeps/vibration": sweep}, study)
+        return {name: found[name] for name in ("F5-y", "F5-xz", "F5-bounded")}
+
+    return decide
+
+
+def test_the_claims_of_fig_5_hold_where_the_sweep_is_as_the_paper_says(shaking):
+    found = shaking(shaken())
+    assert {claim.verdict for claim in found.values()} == {"reproduced"}
+    assert found["F5-y"].figures["doubled_y_wavelengths"] == 0.1
+    assert found["F5-y"].figures["failed_y_wavelengths"] == 1.0
+    assert found["F5-y"].figures["relief_std_m"] == pytest.approx(0.09)
+    # Independent errors stand beside the common ones.
+    assert "y 9.5 cm" in found["F5-y"].ours
+    assert "(independent errors: 30, 95, 35 cm)" in found["F5-y"].ours
+
+
+def test_another_axis_as_sensitive_as_y_turns_its_claim(shaking):
+    # z is worse from 2 wavelengths on: y still doubles first and fails.
+    above = [0.02, 0.021, 0.03, 0.035, 0.11, 0.11]
+    assert shaking(shaken(z=above))["F5-y"].verdict == "partly"
+    # y does nothing at all.
+    assert shaking(shaken(y=[0.02] * 6))["F5-y"].verdict == "contradicted"
+    # y is worst, but heights survive it.
+    mild = [0.02, 0.045, 0.05, 0.055, 0.055, 0.055]
+    found = shaking(shaken(y=mild))["F5-y"]
+    assert found.verdict == "partly"
+    assert found.figures["failed_y_wavelengths"] == np.inf
+    assert "fails (a level DEM has 9.0 cm) from no level" in found.ours
+
+
+def test_the_claim_of_tolerated_errors_turns_at_the_paper_s_own_spread(shaking):
+    over = [0.02, 0.02, 0.03, 0.04, 0.0451, 0.0451]
+    assert shaking(shaken(x=over))["F5-xz"].verdict == "partly"
+    found = shaking(shaken(x=over, z=over))["F5-xz"]
+    assert found.verdict == "contradicted"
+    assert found.figures["exceeded_x_wavelengths"] == 2.0
+    assert found.figures["std_z_m"] == pytest.approx(0.0451)
+
+
+def test_the_claim_of_a_bounded_spread_turns_with_growth_beyond_scatter(shaking):
+    growing = [0.02, 0.021, 0.03, 0.035, 0.04, 0.05]
+    found = shaking(shaken(z=growing))["F5-bounded"]
+    assert found.verdict == "partly"
+    assert found.figures["growth_z"] == pytest.approx(0.25)
+    # The same growth within the scatter of the realizations is none.
+    assert shaking(shaken(z=growing, scatter=0.3))["F5-bounded"].verdict == "reproduced"
+    everything = shaking(shaken(x=growing, y=growing, z=growing))["F5-bounded"]
+    assert everything.verdict == "contradicted"
+
+
+def test_a_sweep_that_lacks_what_a_claim_needs_leaves_it_undecided(shaking):
+    few = shaken().sel(motion_level_wavelengths=[0.0, 0.1, 1.0])
+    found = shaking(few)
+    assert found["F5-y"].verdict == "reproduced"
+    assert found["F5-xz"].verdict == "undecided"
+    assert "levels of 2 wavelengths or more" in found["F5-xz"].ours
+    assert found["F5-bounded"].verdict == "undecided"
+    one = shaking(shaken().sel(motion_axis=["y"], motion_channels=["independent"]))
+    assert {claim.verdict for claim in one.values()} == {"undecided"}
+    assert "motion.channels common, motion.axis x, y and z" in one["F5-y"].ours
+
+
+def test_what_is_not_finite_stays_out_of_json(shaking):
+    calm = [0.02] * 6
+    found = shaking(shaken(x=calm, y=calm, z=calm))
+    plain = claims.as_json(list(found.values()))
+    text = json.dumps(plain, allow_nan=False)
+    assert "doubled_x_wavelengths" not in text
 
 
 def test_the_table_holds_every_claim_with_verdict_and_criterion(products, study):

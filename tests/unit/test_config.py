@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -55,3 +56,20 @@ def test_a_study_never_changes():
     study = config.Study.model_validate(paper())
     with pytest.raises(ValidationError, match="frozen"):
         study.radar.baseline_m = 1.0
+
+
+def test_a_part_with_sweeps_comes_back_from_plain_values():
+    study = config.Study.model_validate(paper())
+    plain = study.values(["sweeps", "seed", "radar.baseline_m"])
+    assert json.loads(json.dumps(plain)) == plain
+    part = config.Study.part(plain)
+    assert part.sweeps == study.sweeps
+    assert part.seed == study.seed
+    assert part.radar.baseline_m == study.radar.baseline_m
+
+
+def test_a_section_of_a_sweep_has_its_base_s_overrides():
+    study = config.Study.model_validate(paper())
+    assert study.imaging.grid_spacing_m == 0.02
+    assert config.swept_section(study, "snr", "imaging").grid_spacing_m == 0.05
+    assert config.swept_section(study, "snr", "radar") == study.radar

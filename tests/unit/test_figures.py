@@ -19,11 +19,25 @@ import yaml
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from vinsar import config, figures, geometry, pipeline
-from vinsar.figures import acquisition, chain, files, height_error, maps, style
+from vinsar import baseline, config, figures, geometry, pipeline, variables
+from vinsar.figures import (
+    acquisition,
+    baselines,
+    chain,
+    files,
+    height_error,
+    maps,
+    style,
+    sweeps,
+)
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
-NAMES = ["fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4"]
+OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr"]
+NAMES = [
+    *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
+    *("baseline_length", "baseline_angle", "baseline_vibration", "snr"),
+]
+NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr"}
 FORMATS = ["pdf", "svg", "png"]
 SMALL: dict[str, dict[str, Any]] = {
     "radar": {"frequency_count": 101, "position_spacing_m": 0.02},
@@ -65,7 +79,42 @@ def study() -> config.Study:
 
 @pytest.fixture(scope="module")
 def products(study: config.Study) -> pipeline.Products:
-    return pipeline.run(study)
+    return pipeline.run(study) | all_sweeps(study)
+
+
+def make_sweep(
+    over: dict[str, list[Any]], std_m: Any, realizations: int = 4, seed: int = 0
+) -> pipeline.Products:
+    """Make a sweep with some std by case; other realizations scatter by a tenth around it."""
+    rng = np.random.default_rng(seed)
+    shape = (*(len(values) for values in over.values()), realizations)
+    std = np.broadcast_to(np.asarray(std_m, float)[..., None], shape)
+    std = std * rng.uniform(0.9, 1.1, shape)
+    data: dict[str, Any] = {}
+    for name, variable in variables.SWEEP.items():
+        one = std if name not in {"coherence", "point_gain"} else 1 / (1 + 20 * std)
+        trailing = {"region": (1.0, 0.4, 2.0), "channel": (1.0, 0.9)}
+        for dim in variable.dims:
+            one = one[..., None] * np.asarray(trailing[dim])
+        data[name] = one.astype(int) if name == "residues" else one
+    swept = {
+        key.replace(".", "_"): (np.asarray(values), {"long_name": key})
+        for key, values in over.items()
+    }
+    return variables.sweep_dataset(data, swept)
+
+
+def all_sweeps(study: config.Study) -> pipeline.Products:
+    """Make the sweeps that the paper's configuration describes, with made up heights."""
+    made = {}
+    for name, sweep in study.sweeps.items():
+        over = {key: list(values) for key, values in sweep.over.items()}
+        shape = tuple(len(values) for values in over.values())
+        # From 1 cm to half a metre along the last key, another size along the others.
+        steps = np.geomspace(0.01, 0.5, shape[-1])
+        others = 1 + 0.3 * np.arange(int(np.prod(shape[:-1]))).reshape(shape[:-1])
+        made[f"sweeps/{name}"] = make_sweep(over, others[..., None] * steps)
+    return made
 
 
 class OnlySections:
@@ -81,7 +130,8 @@ class OnlySections:
 
 def draw(name: str, products: pipeline.Products, study: config.Study) -> Figure:
     figure = figures.FIGURES[name]
-    allowed = {key: products[key] for key in figure.inputs}
+    read = [*figure.inputs, *(f"sweeps/{key}" for key in figure.sweeps)]
+    allowed = {key: products[key] for key in read}
     return figure.draw(allowed, OnlySections(study, figure.sections))  # type: ignore[arg-type]
 
 
@@ -139,10 +189,11 @@ def check_readable(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
             assert x < 1 or y < 1, f"axes overlap: {area} and {other_area}"
 
 
-def test_registry_is_complete_and_declares_known_inputs() -> None:
+def test_registry_is_complete_and_declares_known_inputs(study: config.Study) -> None:
     assert list(figures.FIGURES) == NAMES
     for figure in figures.FIGURES.values():
         assert set(figure.inputs) <= set(pipeline.STAGES)
+        assert set(figure.sweeps) <= set(study.sweeps)
         assert set(figure.sections) <= set(config.Study.model_fields)
         assert "figures" in figure.sections
 
@@ -156,7 +207,7 @@ def test_figure_is_readable_and_takes_what_it_declares(
 ) -> None:
     figure = draw(name, products, study)
     width, height = figure.get_size_inches() * style.MM_PER_INCH
-    assert width == pytest.approx(88 if len(name) == 5 else 180)
+    assert width == pytest.approx(88 if name in NARROW else 180)
     assert height < 247  # fits on a page of A4 with its caption
     check_readable(figure, monkeypatch)
 
@@ -436,6 +487,230 @@ def test_colormaps_are_found_by_either_collection() -> None:
     assert figures.colormap("viridis").name == "viridis"
     with pytest.raises(ValueError, match="no colour map 'batlow nonsense'"):
         figures.colormap("batlow nonsense")
+
+
+def lines_of(axes: Any) -> dict[str, Any]:
+    return {line.get_label(): line for line in axes.lines}
+
+
+def band_of(axes: Any, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return lower and upper edge of one of the bands."""
+    band = axes.collections[number].get_paths()[0].vertices
+    count = (len(band) - 3) // 2
+    return band[1 : 1 + count, 1], band[2 + count : 2 + 2 * count, 1][::-1]
+
+
+def test_fig5_shows_mean_and_band_by_axis_and_mode(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    figure = draw("fig5", products, study)
+    std = 100 * products["sweeps/vibration"]["std"].sel(region="whole_scene")
+    for axes, mode in zip(figure.axes, ("common", "independent"), strict=False):
+        lines = lines_of(axes)
+        for number, (label, axis) in enumerate(
+            [("error along x (the rail)", "x"), ("along y (ahead)", "y"), ("along z (up)", "z")]
+        ):
+            part = std.sel(motion_channels=mode, motion_axis=axis)
+            np.testing.assert_allclose(lines[label].get_ydata(), part.mean("realization"))
+            np.testing.assert_array_equal(
+                lines[label].get_xdata(), part["motion_level_wavelengths"]
+            )
+            low, high = band_of(axes, number)
+            np.testing.assert_allclose(low, np.percentile(part, 10, axis=-1))
+            np.testing.assert_allclose(high, np.percentile(part, 90, axis=-1))
+    first, second, focus = figure.axes
+    assert first.get_ylim() == second.get_ylim()
+    assert first.get_xscale() == "symlog"
+    assert first.get_xlim()[0] < 0
+    assert 0 in first.get_xticks()
+    gain = products["sweeps/vibration"]["point_gain"].sel(motion_channels="common")
+    np.testing.assert_allclose(
+        lines_of(focus)["along y (ahead)"].get_ydata(),
+        gain.sel(motion_axis="y").mean(("realization", "channel")),
+    )
+
+
+def test_fig5_has_the_error_free_the_level_and_the_random_height_as_references(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    axes = draw("fig5", products, study).axes[0]
+    levels = {line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1}
+    std = products["sweeps/vibration"]["std"].sel(region="whole_scene", motion_channels="common")
+    r1 = np.hypot(11.0, 2.0)
+    wavelength = 299_792_458.0 / 14e9
+    # Vertical: B_perp = B sin(theta), so the height of ambiguity is lambda r1 / 2B.
+    expected = {
+        100 * float(std.sel(motion_level_wavelengths=0).mean()),
+        100 * float(products["truth"]["height"].std()),
+        100 * wavelength * r1 / (2 * 0.3) / np.sqrt(12),
+    }
+    assert sorted(levels) == pytest.approx(sorted(expected))
+
+
+def test_curves_differ_without_their_colours(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    for name in ("fig5", "baseline_length", "snr"):
+        axes = draw(name, products, study).axes[0]
+        marked = [line for line in axes.lines if line.get_marker() not in {"None", "*"}]
+        assert len(marked) == 3
+        assert len({line.get_marker() for line in marked}) == 3
+        assert len({line.get_linestyle() + str(line._dash_pattern) for line in marked}) == 3  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "over",
+    [
+        {"motion.channels": ["common"], "motion.axis": ["y"], "motion.level_wavelengths": [0.1]},
+        {
+            "motion.channels": ["independent", "common"],
+            "motion.axis": ["z", "x"],
+            "motion.level_wavelengths": [2.0, 0.0],
+            "motion.spectrum": ["white", "sinusoidal"],
+        },
+    ],
+)
+def test_fig5_takes_what_the_sweep_has(
+    over: dict[str, list[Any]],
+    products: pipeline.Products,
+    study: config.Study,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shape = tuple(len(values) for values in over.values())
+    made = {"sweeps/vibration": make_sweep(over, np.full(shape, 0.03), realizations=1)}
+    figure = draw("fig5", products | made, study)
+    check_readable(figure, monkeypatch)
+    marked = [line for line in figure.axes[0].lines if line.get_marker() != "None"]
+    assert len(marked) == len(over["motion.axis"])
+    for line in marked:
+        assert list(line.get_xdata()) == sorted(over["motion.level_wavelengths"])
+
+
+def test_sweep_without_a_key_that_a_figure_needs_is_refused(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    made = {"sweeps/vibration": make_sweep({"motion.axis": ["x", "y"]}, np.ones(2))}
+    with pytest.raises(ValueError, match=r"goes over motion_axis; motion_channels, motion_level"):
+        draw("fig5", products | made, study)
+
+
+def test_failed_cases_leave_gaps_and_no_exception(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in OF_SWEEPS:
+        key = f"sweeps/{figures.FIGURES[name].sweeps[0]}"
+        broken = products[key].copy(deep=True)
+        broken["std"][..., 0, :] = np.nan
+        last = next(dim for dim in reversed(broken["std"].dims[:-2]) if dim != "realization")
+        broken["std"].loc[{last: broken[last][-1]}] = np.nan
+        check_readable(draw(name, products | {key: broken}, study), monkeypatch)
+
+
+def test_baseline_length_shows_the_sweep_the_bound_and_the_optimum(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    length = [0.1, 0.2, 0.3, 0.5, 1.0]
+    std = np.array([0.09, 0.05, 0.02, 0.0205, 0.06])
+    sweep = make_sweep({"radar.baseline_m": length}, std, realizations=3)
+    sweep["std"].values[:] = std[:, None, None] * np.array([1, 0.5, 2])
+    figure = draw("baseline_length", products | {"sweeps/baseline_length": sweep}, study)
+    spreads, ambiguity, coherence = figure.axes
+    lines = lines_of(spreads)
+    np.testing.assert_allclose(lines["std, whole scene"].get_ydata(), 100 * std)
+    np.testing.assert_allclose(lines["std, visible ground"].get_ydata(), 50 * std)
+    robust = 148.26 * sweep["mad"].sel(region="visible_ground").mean("realization")
+    np.testing.assert_allclose(lines["1.48 MAD, visible ground"].get_ydata(), robust)
+    # Written out: the coherence of level ground, the looks of the window, the phase, the height.
+    r1, wavelength, cell = np.hypot(11.0, 2.0), 299_792_458.0 / 14e9, 299_792_458.0 / 4e9
+    sine, cosine = 11 / r1, 2 / r1
+    across = np.array(length) * sine
+    critical = wavelength * r1 * sine / cosine / (2 * cell)
+    gamma = 1 - across / critical
+    looks = 0.25**2 / (wavelength * r1 / 1.6 * cell / sine)
+    phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
+    bound = wavelength * r1 * sine / (4 * np.pi * across) * phase
+    assert sweeps.looks(study, "baseline_length") == pytest.approx(looks)
+    np.testing.assert_allclose(
+        lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), 100 * bound
+    )
+    height = wavelength * r1 * sine / (2 * across)
+    np.testing.assert_allclose(ambiguity.lines[0].get_ydata(), height)
+    np.testing.assert_allclose(coherence.lines[1].get_ydata(), gamma)
+    for axes in figure.axes:
+        marks = [line.get_xdata()[0] for line in axes.lines if len(set(line.get_xdata())) == 1]
+        assert any(mark == pytest.approx(critical / 4 / sine) for mark in marks)
+    texts = written(figure, monkeypatch)
+    assert "least: 2.00 cm at 0.3 m" in texts
+    assert "within 10 % of it: 0.3 … 0.5 m" in texts
+    assert baselines.best_lengths(sweep) == (0.3, 0.3, 0.5)
+
+
+def test_baseline_angle_shows_draws_and_formulas(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    figure = draw("baseline_angle", products, study)
+    product = products["baseline_angle"]
+    first, second = (lines_of(axes) for axes in figure.axes)
+    shown = {
+        "length_drawn": first["drawn, exact inversion"],
+        "length_eq5": first["Eq. 5"],
+        "length_exact": first["exact derivative"],
+        "angle_drawn": second["drawn, exact inversion"],
+        "angle_eq12": second["Eq. 12"],
+    }
+    for name, line in shown.items():
+        np.testing.assert_allclose(line.get_ydata(), 1000 * product[name], err_msg=name)
+        np.testing.assert_allclose(line.get_xdata(), baseline.ANGLES_DEG)
+
+
+def test_heat_maps_hold_the_sweep_on_one_scale(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = draw("baseline_vibration", products, study)
+    std = 100 * products["sweeps/baseline_vibration"]["std"].sel(region="whole_scene")
+    meshes = [axes.collections[0] for axes in figure.axes[:2]]
+    for mesh, mode in zip(meshes, ("common", "independent"), strict=True):
+        part = std.sel(motion_channels=mode).mean("realization")
+        np.testing.assert_allclose(mesh.get_array(), part)
+    assert meshes[0].get_clim() == meshes[1].get_clim()
+    assert meshes[0].get_clim()[0] == pytest.approx(float(std.mean("realization").min()))
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == ["0.1", "0.2", "0.3", "0.5", "0.7", "1"]
+    texts = written(figure, monkeypatch)
+    for level in (3, 5, 10, 20):
+        assert f"{level} cm" in texts
+
+
+def test_snr_shows_the_sweep_and_the_bound(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    lines = lines_of(draw("snr", products, study).axes[0])
+    sweep = products["sweeps/snr"]
+    ratio = sweep["echo_snr_db"].values
+    std = sweep["std"].mean("realization")
+    np.testing.assert_allclose(
+        lines["std, whole scene"].get_ydata(), 100 * std.sel(region="whole_scene")
+    )
+    np.testing.assert_array_equal(lines["std, whole scene"].get_xdata(), ratio)
+    seen = baseline.view(study.radar, study.scene)
+    gamma = (1 - seen.across(0.3) / seen.critical_baseline) / (1 + 10 ** (-ratio / 10))
+    looks = sweeps.looks(study, "snr")
+    expected = 100 * seen.height_std_bound(0.3, gamma, looks)
+    np.testing.assert_allclose(
+        lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), expected
+    )
+
+
+@pytest.mark.parametrize("name", [*OF_SWEEPS, "baseline_angle"])
+def test_figures_of_sweeps_give_the_same_bytes(
+    name: str, products: pipeline.Products, study: config.Study, tmp_path: Path
+) -> None:
+    made = []
+    for number in range(2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        made.append(save_all(draw(name, products, study), folder))
+    assert made[0] == made[1]
 
 
 DRAW_FIG1 = """

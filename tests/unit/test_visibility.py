@@ -100,3 +100,46 @@ def test_truth_marks_as_shadow_what_either_antenna_mostly_misses(terrain, rail):
     seen = truth["visible_fraction"].values[:, :, 0]
     np.testing.assert_array_equal(seen, [[1, 0, 0, 0, 1], [1, 0, 0, 1, 1]])
     assert truth["shadow"].values[:, 0].tolist() == [False, True, True, True, False]
+
+
+def march(terrain, antenna, points):
+    """Follow each line of sight over the raster's rows, but not the one just before the point."""
+    x, y = terrain["x"].values, terrain["y"].values
+    height = terrain["height"].values
+    ahead = y[None, :] - antenna[1]
+    distance = points[:, 1:2] - antenna[1]
+    column = antenna[0] + (points[:, :1] - antenna[0]) * ahead / distance
+    line = antenna[2] + (points[:, 2:] - antenna[2]) * ahead / distance
+    ground = np.stack([np.interp(column[:, row], x, height[row]) for row in range(y.size)], axis=1)
+    row = np.floor((points[:, 1:2] - y[0]) / (y[1] - y[0]))
+    before = np.arange(y.size) < row
+    return ~np.any(before & (ground > line), axis=1)
+
+
+@pytest.mark.parametrize("kind", ["peaks", "boxes"])
+def test_coarse_rasters_of_peaks_and_boxes_cast_the_shadows_of_a_march(kind):
+    x, y = np.linspace(-2.5, 2.5, 200), np.linspace(10.0, 16.0, 240)
+    rng = np.random.default_rng(2)
+    if kind == "peaks":
+        fine = scene.terrain(
+            "peaks", x_min_m=-2.5, x_max_m=2.5, y_min_m=10.0, y_max_m=16.0, spacing_m=0.01,
+            peak_height_m=0.3, reflectivity_offset=0.5,
+        )  # fmt: skip
+        height = scene.sample(fine["height"], *np.meshgrid(x, y))
+    else:
+        height = np.zeros((240, 200))
+        for _ in range(25):
+            row, column = rng.integers(0, 220), rng.integers(0, 180)
+            tall, wide = rng.integers(8, 25, 2)
+            height[row : row + tall, column : column + wide] = rng.uniform(0.1, 0.5)
+    terrain = variables.dataset(
+        "terrain", {"height": height, "reflectivity": height + 1}, {"x": x, "y": y}
+    )
+    place = rng.uniform([-2.5, 10.0], [2.5, 16.0], (20_000, 2))
+    place = place[np.argsort(place[:, 1])]
+    points = np.column_stack([place, scene.sample(terrain["height"], place[:, 0], place[:, 1])])
+    antennas = np.array([[-0.4, 0.0, 2.0], [0.4, 0.0, 1.5]])
+    found = visibility.visible_points(terrain, antennas, points)
+    marched = np.array([march(terrain, antenna, points) for antenna in antennas])
+    assert 0.5 < marched.mean() < 0.98
+    assert (found == marched).mean() > 0.9995

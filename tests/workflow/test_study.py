@@ -1,6 +1,8 @@
 """The workflow as a user runs it: on a copy of the repository, with a tiny study."""
 
+import html
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -9,10 +11,11 @@ import xarray as xr
 from vinsar import accuracy, claims, figures, pipeline, storage, validation
 
 ROOT = Path(__file__).parents[2]
-FIGURE_RULES = {"fig1", "fig2", "fig3", "fig3_panels", "fig4"}
+OF_SWEEPS = {"fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr"}
+FIGURE_RULES = {"fig1", "fig2", "fig3", "fig3_panels", "fig4", "figure_baseline_angle"} | OF_SWEEPS
 AFTER_FILTERING = {
     "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims", "fig3",
-    "fig3_panels", "fig4",
+    "fig3_panels", "fig4", "sweep", *OF_SWEEPS,
 }  # fmt: skip
 
 
@@ -26,6 +29,14 @@ def products(study):
     return pipeline.run(study)
 
 
+@pytest.fixture(scope="module")
+def sweeps(checkout, study):
+    return {
+        f"sweeps/{name}": storage.read(checkout.results / f"sweeps/{name}.nc", "sweep")
+        for name in study.sweeps
+    }
+
+
 def test_the_workflow_gives_the_same_numbers_as_the_library(checkout, products):
     for name in pipeline.STAGES:
         stored = storage.read(checkout.results / f"{name}.nc", name)
@@ -33,10 +44,10 @@ def test_the_workflow_gives_the_same_numbers_as_the_library(checkout, products):
         xr.testing.assert_identical(stored, products[name])
 
 
-def test_the_summary_and_the_claims_are_those_of_the_library(checkout, products, study):
+def test_the_summary_and_the_claims_are_those_of_the_library(checkout, products, sweeps, study):
     summary = json.loads((checkout.results / "accuracy.json").read_text())
     assert summary == accuracy.summary(products["accuracy"])
-    found = claims.evaluate(products, study)
+    found = claims.evaluate(products | sweeps, study)
     assert json.loads((checkout.results / "claims.json").read_text()) == claims.as_json(found)
     assert (checkout.results / "claims.md").read_text() == claims.as_markdown(found)
 
@@ -51,6 +62,25 @@ def test_each_product_tells_the_inputs_and_sections_that_its_stage_declares(chec
         attributes = storage.read(checkout.results / f"{name}.nc", name).attrs
         assert set(json.loads(attributes["vinsar_inputs"])) == set(stage.inputs), name
         assert set(json.loads(attributes["vinsar_configuration"])) == set(stage.sections), name
+
+
+def test_each_figure_tells_the_products_sweeps_and_sections_that_it_declares(checkout):
+    for name, figure in figures.FIGURES.items():
+        text = (checkout.results / f"figures/{name}.svg").read_text(encoding="utf-8")
+        found = re.search(r"<dc:description>(.*?)</dc:description>", text, re.DOTALL)
+        attributes = json.loads(html.unescape(found[1]))
+        read = {*figure.inputs, *(f"sweeps/{sweep}" for sweep in figure.sweeps)}
+        # The single panels of the third figure are drawn together.
+        single = name.startswith("fig3") and name != "fig3"
+        assert set(json.loads(attributes["vinsar_inputs"])) >= read, name
+        assert single or set(json.loads(attributes["vinsar_inputs"])) == read, name
+        assert set(json.loads(attributes["vinsar_configuration"])) == set(figure.sections), name
+
+
+def test_a_sweep_s_values_rerun_what_reads_it(checkout):
+    rules = checkout.would_run("sweeps: {snr: {realizations: 2}}\n")
+    assert {"sweep", "figure_snr"} <= rules
+    assert rules <= {"sweep", "claims", "fig5", *OF_SWEEPS}
 
 
 def test_a_second_run_has_nothing_to_do(checkout):

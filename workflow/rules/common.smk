@@ -1,5 +1,6 @@
 # The checked configuration, and the parts of it and of the library that rules depend on.
 import os
+from functools import cache
 
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
@@ -43,9 +44,19 @@ def stage_sources(name):
     ]
 
 
+def product_files(*names):
+    return {name: f"<results>/{name}.nc" for name in names}
+
+
+def sweep_files(*names):
+    """The files of sweeps, under the names by which the library finds them."""
+    return {f"sweeps/{name}": f"<results>/sweeps/{name}.nc" for name in names}
+
+
 def figure_inputs(*names):
     products = {name for figure in names for name in figures.FIGURES[figure].inputs}
-    return {name: f"<results>/{name}.nc" for name in sorted(products)}
+    read = {name for figure in names for name in figures.FIGURES[figure].sweeps}
+    return product_files(*sorted(products)) | sweep_files(*sorted(read))
 
 
 def figure_configuration(*names):
@@ -65,7 +76,16 @@ def figure_files(*names, caption):
     return files
 
 
+@cache
+def checked_sweep(name):
+    """A sweep, all of whose cases are valid: nothing runs if one is not."""
+    try:
+        sweep.studies(STUDY, name)
+    except validation.ConfigurationError as error:
+        raise WorkflowError(str(error)) from None
+    return STUDY.sweeps[name].model_dump(mode="json")
+
+
 def sweep_configuration(wildcards):
     """What a sweep's cases read: not how figures look, where it runs, nor other sweeps."""
-    one = STUDY.sweeps[wildcards.sweep].model_dump(mode="json")
-    return configuration(*sweep.declared()) | {"sweep": one}
+    return configuration(*sweep.declared()) | {"sweep": checked_sweep(wildcards.sweep)}

@@ -1,4 +1,4 @@
-# The paper's figures, each as PDF, SVG and PNG.
+# The figures, each as PDF, SVG and PNG.
 
 
 rule fig1:
@@ -77,5 +77,85 @@ rule fig4:
         "<benchmarks>/fig4.tsv"
     params:
         configuration=figure_configuration("fig4"),
+    script:
+        "../scripts/figures.py"
+
+
+rule fig5:
+    input:
+        **figure_inputs("fig5"),
+        code=sources_of("figures", script="figures"),
+    output:
+        figure_files("fig5", caption="../report/fig5.rst"),
+    log:
+        "<logs>/fig5.log",
+    benchmark:
+        "<benchmarks>/fig5.tsv"
+    params:
+        configuration=figure_configuration("fig5"),
+    script:
+        "../scripts/figures.py"
+
+
+rule figure_baseline_length:
+    input:
+        **figure_inputs("baseline_length"),
+        code=sources_of("figures", script="figures"),
+    output:
+        figure_files("baseline_length", caption="../report/baseline_length.rst"),
+    log:
+        "<logs>/figure_baseline_length.log",
+    benchmark:
+        "<benchmarks>/figure_baseline_length.tsv"
+    params:
+        configuration=figure_configuration("baseline_length"),
+    script:
+        "../scripts/figures.py"
+
+
+rule figure_baseline_angle:
+    input:
+        **figure_inputs("baseline_angle"),
+        code=sources_of("figures", script="figures"),
+    output:
+        figure_files("baseline_angle", caption="../report/baseline_angle.rst"),
+    log:
+        "<logs>/figure_baseline_angle.log",
+    benchmark:
+        "<benchmarks>/figure_baseline_angle.tsv"
+    params:
+        configuration=figure_configuration("baseline_angle"),
+    script:
+        "../scripts/figures.py"
+
+
+rule figure_baseline_vibration:
+    input:
+        **figure_inputs("baseline_vibration"),
+        code=sources_of("figures", script="figures"),
+    output:
+        figure_files("baseline_vibration", caption="../report/baseline_vibration.rst"),
+    log:
+        "<logs>/figure_baseline_vibration.log",
+    benchmark:
+        "<benchmarks>/figure_baseline_vibration.tsv"
+    params:
+        configuration=figure_configuration("baseline_vibration"),
+    script:
+        "../scripts/figures.py"
+
+
+rule figure_snr:
+    input:
+        **figure_inputs("snr"),
+        code=sources_of("figures", script="figures"),
+    output:
+        figure_files("snr", caption="../report/snr.rst"),
+    log:
+        "<logs>/figure_snr.log",
+    benchmark:
+        "<benchmarks>/figure_snr.tsv"
+    params:
+        configuration=figure_configuration("snr"),
     script:
         "../scripts/figures.py"

@@ -35,6 +35,21 @@ rule accuracy:
         "../scripts/stage.py"
 
 
+rule baseline_angle:
+    input:
+        code=stage_sources("baseline_angle"),
+    output:
+        "<results>/baseline_angle.nc",
+    log:
+        "<logs>/baseline_angle.log",
+    benchmark:
+        "<benchmarks>/baseline_angle.tsv"
+    params:
+        configuration=stage_configuration("baseline_angle"),
+    script:
+        "../scripts/stage.py"
+
+
 rule accuracy_summary:
     input:
         accuracy="<results>/accuracy.nc",

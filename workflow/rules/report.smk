@@ -3,7 +3,8 @@
 
 rule claims:
     input:
-        **{name: f"<results>/{name}.nc" for name in claims.INPUTS},
+        **product_files(*claims.INPUTS),
+        **sweep_files(*claims.SWEEPS),
         code=sources_of("claims", script="claims"),
     output:
         json=report(

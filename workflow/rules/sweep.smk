@@ -1,4 +1,5 @@
 # Sweeps over keys of the configuration: results/<study>/sweeps/<name>.nc.
+import re
 
 
 rule sweep:
@@ -11,7 +12,7 @@ rule sweep:
     benchmark:
         "<benchmarks>/sweep_{sweep}.tsv"
     wildcard_constraints:
-        sweep="|".join(STUDY.sweeps) or "(?!)",
+        sweep="|".join(map(re.escape, STUDY.sweeps)) or "(?!)",
     threads: workflow.cores
     params:
         configuration=sweep_configuration,

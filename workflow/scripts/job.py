@@ -1,12 +1,16 @@
 """What every script does around its one library call."""
 
 import logging
+import os
+import signal
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
 
 import dask
+import psutil
 
 from vinsar import lineage, provenance, storage, sweep
 
@@ -15,8 +19,8 @@ from vinsar import lineage, provenance, storage, sweep
 def job(snakemake):
     """Log to the rule's file; say what went wrong in a sentence, not in a traceback."""
     logging.basicConfig(filename=snakemake.log[0], level=logging.INFO, format="%(message)s")
-    logging.getLogger("distributed").setLevel(logging.WARNING)
     dask.config.set(num_workers=snakemake.threads)
+    end_with_snakemake()
     started, clock = time.time(), time.monotonic()
     try:
         yield
@@ -27,6 +31,37 @@ def job(snakemake):
     except Exception as error:
         logging.exception("%s: a fault of vinsar itself, %s", snakemake.rule, error)
         sys.exit(1)
+    except KeyboardInterrupt:
+        logging.error("%s: interrupted; the next run goes on", snakemake.rule)
+        logging.shutdown()
+        # At once: the end of Python would wait for threads that are at work.
+        os._exit(130)
+
+
+def end_with_snakemake():
+    """Interrupt this process when the Snakemake that wants it is gone, as after kill -9."""
+    above = [
+        process
+        for process in psutil.Process().parents()
+        if any(Path(part).name == "snakemake" for part in process.cmdline())
+    ]
+
+    def watch():
+        while all(process.is_running() and process.status() != "zombie" for process in above):
+            time.sleep(1)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    def interrupt(*_):
+        # Once is enough: another, as Snakemake sends it, would cut the cleaning up short.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    # A shell lets its background jobs ignore it.
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupt)
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def record(snakemake, started, seconds):
@@ -57,7 +92,10 @@ def product_paths(snakemake):
 
 def read_products(snakemake):
     """Read the rule's products."""
-    return {name: storage.read(path, name) for name, path in product_paths(snakemake).items()}
+    return {
+        name: storage.read(path, "sweep" if name.startswith("sweeps/") else name)
+        for name, path in product_paths(snakemake).items()
+    }
 
 
 def attributes(snakemake, stage):

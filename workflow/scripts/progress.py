@@ -5,6 +5,7 @@ import sys
 import time
 
 _SECONDS_BETWEEN_LINES = 10
+_WIDTH = 30
 
 
 class Progress:
@@ -12,29 +13,34 @@ class Progress:
 
     def __init__(self, name):
         self.name = name
-        self.start = self.shown = None
+        self.start = self.logged = None
         self.first = 0
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        if sys.stderr.isatty() and self.start is not None:
+        if self.start is not None and sys.stderr.isatty():
             sys.stderr.write("\n")
 
     def __call__(self, done, total):
-        """Show how far it is, the log at most every ten seconds."""
+        """Show how far it is; in the log at most every ten seconds."""
         now = time.monotonic()
         if self.start is None:
             self.start, self.first = now, done
-        seconds = now - self.start
-        rate = (done - self.first) / seconds if seconds else 0.0
-        left = f"{(total - done) / rate:.0f} s left" if rate else "time left unknown"
-        text = f"{self.name}: {done} of {total} cases, {rate:.1f} cases/s, {left}"
+        text = f"{self.name}: {self.describe(done, total, now - self.start)}"
         if sys.stderr.isatty():
-            full = round(30 * done / total) if total else 30
-            sys.stderr.write(f"\r[{'#' * full}{'.' * (30 - full)}] {text}\033[K")
+            full = _WIDTH * done // total
+            sys.stderr.write(f"\r[{'#' * full}{'.' * (_WIDTH - full)}] {text}\033[K")
             sys.stderr.flush()
-        if self.shown is None or now - self.shown >= _SECONDS_BETWEEN_LINES or done == total:
+        if self.logged is None or now - self.logged >= _SECONDS_BETWEEN_LINES or done == total:
             logging.info(text)
-            self.shown = now
+            self.logged = now
+
+    def describe(self, done, total, seconds):
+        """Say how many cases are done; how fast and for how long yet, once one is."""
+        text = f"{done} of {total} cases"
+        if done > self.first and seconds > 0:
+            rate = (done - self.first) / seconds
+            text += f", {rate:.1f} cases/s, {(total - done) / rate:.0f} s left"
+        return text

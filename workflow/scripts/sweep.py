@@ -8,9 +8,9 @@ from progress import Progress
 
 from vinsar import checkpoint, cluster, provenance, storage, sweep, validation
 
-with job(snakemake):
-    # A line a stage and case would drown the progress.
-    logging.getLogger("vinsar").setLevel(logging.WARNING)
+
+def main():
+    """Run the sweep of the rule's wildcard."""
     name = snakemake.wildcards.sweep
     study = validation.check(snakemake.config)
     code = provenance.code_digest(snakemake.input.code)
@@ -27,3 +27,11 @@ with job(snakemake):
         )
     storage.write(result, output, "sweep", attributes(snakemake, f"sweep {name}"))
     finished.remove()
+
+
+# Worker processes import this file.
+if __name__ == "__main__":
+    with job(snakemake):
+        # A line a stage and case would drown the progress.
+        logging.getLogger("vinsar").setLevel(logging.WARNING)
+        main()

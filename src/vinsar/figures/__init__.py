@@ -1,4 +1,4 @@
-"""The figures of the paper, drawn from the products of the chain.
+"""The figures of the paper, drawn from the products of the chain and from sweeps.
 
 `FIGURES` is the one description of them; `save` writes one to files. Figures may read the truth,
 which the processing never does.
@@ -10,7 +10,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from vinsar.figures import acquisition, chain, height_error, registration_error
+from vinsar.figures import (
+    acquisition,
+    baselines,
+    chain,
+    height_error,
+    noise,
+    registration_error,
+    vibration,
+)
 from vinsar.figures.files import save
 from vinsar.figures.style import colormap
 
@@ -37,11 +45,14 @@ class Figure:
         Products that it reads, keys of `vinsar.pipeline.STAGES`.
     sections
         Parts of the configuration that it reads, and no others.
+    sweeps
+        Sweeps that it reads; `draw` finds each among the products as ``sweeps/<name>``.
     """
 
     draw: Callable[[Products, config.Study], matplotlib.figure.Figure]
     inputs: tuple[str, ...]
     sections: tuple[str, ...]
+    sweeps: tuple[str, ...] = ()
 
 
 FIGURES: dict[str, Figure] = {
@@ -55,5 +66,26 @@ FIGURES: dict[str, Figure] = {
         for letter in chain.PANELS
     },
     "fig4": Figure(height_error.draw, ("accuracy",), ("figures",)),
+    "fig5": Figure(
+        vibration.draw, ("truth",), ("figures", "radar", "scene", "sweeps"), ("vibration",)
+    ),
+    "baseline_length": Figure(
+        baselines.draw_length,
+        (),
+        ("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
+        ("baseline_length",),
+    ),
+    "baseline_angle": Figure(
+        baselines.draw_angle, ("baseline_angle",), ("figures", "radar", "scene")
+    ),
+    "baseline_vibration": Figure(
+        baselines.draw_vibration, (), ("figures", "motion", "sweeps"), ("baseline_vibration",)
+    ),
+    "snr": Figure(
+        noise.draw,
+        (),
+        ("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
+        ("snr",),
+    ),
 }
-"""The figures by name, in the paper's order."""
+"""The figures by name: the paper's in its order, then those of its section 1.2 and of noise."""

@@ -11,147 +11,29 @@ AVX-512, they are copied one by one: the same samples, so the same image.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
-from numba import config, njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+
+from vinsar.kernels.compiling import helper, kernel, part
+from vinsar.kernels.functions import phasor, spline
+from vinsar.kernels.lookup import LANES, PADDING, pairs_for
+from vinsar.kernels.matched import add
+
+__all__ = ["PADDING", "accumulate"]
 
 TILE = 128
 """Columns handled at a time, a multiple of LANES: their buffers stay in the first-level cache."""
 
-LANES = 16
-"""Pixels whose samples are looked up at once."""
-
-PADDING = 32
-"""Samples that profiles must hold beyond the last one used, so that a window never ends early."""
-
-_BEFORE = 15
-"""Where the window begins, in samples before the one of the group's middle pixel."""
-
-_REACH = 14
-"""How far from the middle pixel's sample the others' may lie, for linear and cubic alike."""
-
-_FLOAT, _INT = ir.FloatType(), ir.IntType(32)
-_FLOATS, _INTS = ir.VectorType(_FLOAT, LANES), ir.VectorType(_INT, LANES)
-
-
-def _permutes(context: Any) -> bool:
-    return "+avx512f" in context.codegen().magic_tuple()[2]
-
-
-@intrinsic
-def _has_permute(typingctx):  # type: ignore[no-untyped-def]
-    """Tell whether the machine that is compiled for looks samples up in vector registers."""
-    del typingctx
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        del builder, signature, arguments
-        return ir.Constant(ir.IntType(1), _permutes(context))
-
-    return types.boolean(), generate
-
-
-@intrinsic
-def _copy_window(typingctx, index, begin, base, profile, out):  # type: ignore[no-untyped-def]
-    """Copy ``profile[base + index[begin:begin + LANES] + tap]`` to ``out[tap, begin:...]``.
-
-    All of them must lie within the window of 32 samples that the middle one sets. The profile is
-    read from it whatever the indices are, so no wrong index leaves the profile.
-    """
-    del typingctx
-    taps = out.count
-    if not (index.layout == profile.layout == out.dtype.layout == "C"):
-        return None  # No such overload: the pointers below know no strides.
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        if not _permutes(context):
-            return context.get_dummy_value()  # Never reached: the caller asks `_has_permute`.
-
-        def data(number, position):  # type: ignore[no-untyped-def]
-            array = context.make_array(signature.args[number])(context, builder, arguments[number])
-            return builder.gep(array.data, [position])
-
-        def constant(value):  # type: ignore[no-untyped-def]
-            return ir.Constant(_INT, value)
-
-        def load(pointer, kind):  # type: ignore[no-untyped-def]
-            value = builder.load(builder.bitcast(pointer, kind.as_pointer()))
-            value.align = 4
-            return value
-
-        def splat(value):  # type: ignore[no-untyped-def]
-            nothing = ir.Constant(_INTS, ir.Undefined)
-            first = builder.insert_element(nothing, value, constant(0))
-            return builder.shuffle_vector(first, nothing, ir.Constant(_INTS, [0] * LANES))
-
-        indices = load(data(0, arguments[1]), _INTS)
-        origin = builder.trunc(arguments[2], _INT)
-        middle = builder.extract_element(indices, constant(LANES // 2))
-        window = builder.sub(builder.add(middle, origin), constant(_BEFORE))
-        profile_type = context.make_array(signature.args[3])(context, builder, arguments[3])
-        samples = builder.trunc(cgutils.unpack_tuple(builder, profile_type.shape)[0], _INT)
-        most = builder.sub(samples, constant(2 * LANES))
-        below = builder.icmp_signed("<", window, constant(0))
-        window = builder.select(below, constant(0), window)
-        above = builder.icmp_signed(">", window, most)
-        window = builder.select(above, most, window)
-        place = builder.add(indices, splat(builder.sub(origin, window)))
-        start = builder.sext(window, ir.IntType(64))
-        low = load(data(3, start), _FLOATS)
-        high = load(data(3, builder.add(start, ir.Constant(start.type, LANES))), _FLOATS)
-        permute = cgutils.get_or_insert_function(
-            builder.module,
-            ir.FunctionType(_FLOATS, [_FLOATS, _INTS, _FLOATS]),
-            "llvm.x86.avx512.vpermi2var.ps.512",
-        )
-        rows = cgutils.unpack_tuple(builder, arguments[4])
-        for tap in range(taps):
-            at = builder.add(place, ir.Constant(_INTS, [tap] * LANES))
-            found = builder.call(permute, [low, at, high])
-            array = context.make_array(signature.args[4].dtype)(context, builder, rows[tap])
-            pointer = builder.gep(array.data, [arguments[1]])
-            stored = builder.store(found, builder.bitcast(pointer, _FLOATS.as_pointer()))
-            stored.align = 4
-        return context.get_dummy_value()
-
-    return types.void(index, begin, base, profile, out), generate
-
-
-if config.DISABLE_JIT:  # Then the kernels are plain Python, which has no vector registers.
-
-    def _has_permute() -> bool:
-        return False
-
-
-# Fits of sin(pi t) / t and cos(pi t) in powers of t^2 on |t| <= 1/2, errors below 1.2e-6 and 5e-8.
-# PyPI's llvmlite has no vector math library: math.sin would keep the loop scalar.
-_S0 = np.float32(3.1415902702069918)
-_S1 = np.float32(-5.16740673327233)
-_S2 = np.float32(2.544010518503205)
-_S3 = np.float32(-0.5594624554675647)
-_C0 = np.float32(0.9999999532476083)
-_C1 = np.float32(-4.934792830619607)
-_C2 = np.float32(4.058411352861885)
-_C3 = np.float32(-1.3318765680766596)
-_C4 = np.float32(0.21968961108988486)
 # sqrt(1 + e) - 1 in powers of e; the next term is -21/1024 e^6.
 _E1, _E2, _E3 = np.float32(1 / 2), np.float32(-1 / 8), np.float32(1 / 16)
 _E4, _E5 = np.float32(-5 / 128), np.float32(7 / 256)
 _NEXT_TERM = 21 / 1024
-_ONE, _HALF, _SIXTH = np.float32(1), np.float32(0.5), np.float32(1 / 6)
-_TWO_THIRDS = np.float32(2 / 3)
+_ONE, _HALF = np.float32(1), np.float32(0.5)
 
 _LARGEST_TURN = 2e-6
 """Largest error of the series in cycles of the carrier's phase: -98 dB, at a tile's corner."""
 
-# Letting products and sums fuse halves the arithmetic; nothing here depends on their rounding.
-_FAST = {"contract", "nsz"}
 
-
-@njit(nogil=True, inline="always", error_model="numpy", fastmath=_FAST)
+@part
 def _offsets(out, square, dx, dz, by_square, by_x, by_z, anchor, series):  # type: ignore[no-untyped-def]
     # R = R0 sqrt(1 + e) with e = (|d|^2 + 2 d . (p0 - a)) / R0^2: no two ranges are subtracted.
     for i in range(out.size):
@@ -163,7 +45,7 @@ def _offsets(out, square, dx, dz, by_square, by_x, by_z, anchor, series):  # typ
         out[i] += relative * anchor
 
 
-@njit(nogil=True, inline="always", error_model="numpy", fastmath=_FAST)
+@part
 def _turn(offset, place0, per_step, turn0, per_cycle, index, fraction, cosine, sine):  # type: ignore[no-untyped-def]
     for i in range(offset.size):
         place = offset[i] * per_step + place0
@@ -171,30 +53,10 @@ def _turn(offset, place0, per_step, turn0, per_cycle, index, fraction, cosine, s
         fraction[i] = place - floor
         index[i] = np.int32(floor)
         cycles = offset[i] * per_cycle + turn0
-        t = cycles - np.floor(cycles + _HALF)
-        q = t * t
-        s = t * (_S0 + q * (_S1 + q * (_S2 + q * _S3)))
-        c = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * _C4)))
-        twice = s + s
-        cosine[i] = _ONE - twice * s
-        sine[i] = twice * c
+        cosine[i], sine[i] = phasor(cycles - np.floor(cycles + _HALF))
 
 
-@njit(nogil=True, inline="always", error_model="numpy")
-def _copy(windowed, index, base, profile, out):  # type: ignore[no-untyped-def]
-    if windowed:
-        for begin in range(0, index.size, LANES):
-            _copy_window(index, np.int64(begin), base, profile, out)
-    else:
-        last = profile.size - PADDING
-        for i in range(index.size):
-            # Unsigned, so that no negative index needs a look.
-            k = np.uint64(min(max(base + index[i], 0), last))
-            for tap in range(len(out)):
-                out[tap][i] = profile[k + np.uint64(tap)]
-
-
-@njit(nogil=True, error_model="numpy")
+@helper
 def _tile(x, y, z, antennas):  # type: ignore[no-untyped-def]
     # Wide tiles save set-up; a third of the range is where float32 and the series still suffice.
     nearest = np.inf
@@ -207,7 +69,7 @@ def _tile(x, y, z, antennas):  # type: ignore[no-untyped-def]
     return tile
 
 
-@njit(nogil=True, error_model="numpy")
+@helper
 def _reach(dx, dz, half_x, half_z, x0, y0, z0, antennas):  # type: ignore[no-untyped-def]
     # How far in range a pixel of a group can be from the group's middle one, at any position.
     right, up = np.float32(0), np.float32(0)
@@ -228,7 +90,7 @@ def _reach(dx, dz, half_x, half_z, x0, y0, z0, antennas):  # type: ignore[no-unt
     return most
 
 
-@njit(nogil=True, error_model="numpy")
+@helper
 def _prepare(  # type: ignore[no-untyped-def]
     antennas, x0, y0, z0, half_x, half_z, share, factors, anchor, worst
 ):
@@ -252,7 +114,7 @@ def _prepare(  # type: ignore[no-untyped-def]
         worst[position] = max(worst[position], range_ * (e * e * e) * (e * e * e))
 
 
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=_FAST)
+@kernel
 def accumulate(
     image: np.ndarray,
     x: np.ndarray,
@@ -300,7 +162,7 @@ def accumulate(
     cosine_buffer = np.empty(TILE, np.float32)
     sine_buffer = np.empty(TILE, np.float32)
     sums = np.empty((2, TILE), np.float32)
-    samples = np.empty((2, 4, TILE), np.float32)
+    weights = np.empty((4, TILE), np.float32)
     # For both ends of each position: what turns a pixel's place into e, and the anchor.
     factors = np.empty((2, 4, positions), np.float32)
     share = np.empty(positions)  # of each end in the half path; monostatic, the first has all
@@ -330,10 +192,8 @@ def accumulate(
         )  # fmt: skip
         cosine, sine = cosine_buffer[:width], sine_buffer[:width]
         sum_real, sum_imag = sums[0, :width], sums[1, :width]
-        real0, real1 = samples[0, 0, :width], samples[0, 1, :width]
-        real2, real3 = samples[0, 2, :width], samples[0, 3, :width]
-        imag0, imag1 = samples[1, 0, :width], samples[1, 1, :width]
-        imag2, imag3 = samples[1, 2, :width], samples[1, 3, :width]
+        weight0, weight1 = weights[0, :width], weights[1, :width]
+        weight2, weight3 = weights[2, :width], weights[3, :width]
         for row in range(rows):
             half_x, half_z = 0.0, 0.0
             for i in range(width):
@@ -341,11 +201,11 @@ def accumulate(
                 right, up = x[pixel] - x[middle], z[row, pixel] - z[row, middle]
                 dx[i], dz[i], square[i] = right, up, right * right + up * up
                 half_x, half_z = max(half_x, abs(right)), max(half_z, abs(up))
-            sum_real[:] = 0
-            sum_imag[:] = 0
-            windowed = _has_permute() and _reach(
+            sums[:] = 0
+            reach = _reach(
                 dx, dz, half_x, half_z, x[middle], y[row], z[row, middle], antennas,
-            ) < _REACH * range_step  # fmt: skip
+            )  # fmt: skip
+            pairs = pairs_for(np.ceil(reach / range_step))
             anchor[:] = 0
             worst[:] = 0
             for end in range(2):
@@ -371,31 +231,20 @@ def accumulate(
                     offset, place0[position], per_step, turn0[position], per_cycle, index,
                     fraction, cosine, sine,
                 )  # fmt: skip
+                real, imag = profile_real[position], profile_imag[position]
                 if cubic:
-                    first = base[position] - 1
-                    reals, imags = (real0, real1, real2, real3), (imag0, imag1, imag2, imag3)
-                    _copy(windowed, index, first, profile_real[position], reals)
-                    _copy(windowed, index, first, profile_imag[position], imags)
                     for i in range(width):
-                        # The weights of the four B-splines that reach this place.
-                        t = fraction[i]
-                        rest, tt = _ONE - t, t * t
-                        w0 = _SIXTH * rest * (rest * rest)
-                        w1 = _TWO_THIRDS + tt * (_HALF * t - _ONE)
-                        w3 = _SIXTH * t * tt
-                        w2 = _ONE - w0 - w1 - w3
-                        a = w0 * real0[i] + w1 * real1[i] + w2 * real2[i] + w3 * real3[i]
-                        b = w0 * imag0[i] + w1 * imag1[i] + w2 * imag2[i] + w3 * imag3[i]
-                        sum_real[i] += a * cosine[i] - b * sine[i]
-                        sum_imag[i] += a * sine[i] + b * cosine[i]
+                        weight0[i], weight1[i], weight2[i], weight3[i] = spline(fraction[i])
+                    add(
+                        pairs, index, base[position] - 1, (weight0, weight1, weight2, weight3),
+                        cosine, sine, real, imag, sum_real, sum_imag,
+                    )  # fmt: skip
                 else:
-                    first = base[position]
-                    _copy(windowed, index, first, profile_real[position], (real0, real1))
-                    _copy(windowed, index, first, profile_imag[position], (imag0, imag1))
                     for i in range(width):
-                        a = real0[i] + fraction[i] * (real1[i] - real0[i])
-                        b = imag0[i] + fraction[i] * (imag1[i] - imag0[i])
-                        sum_real[i] += a * cosine[i] - b * sine[i]
-                        sum_imag[i] += a * sine[i] + b * cosine[i]
+                        weight0[i] = _ONE - fraction[i]
+                    add(
+                        pairs, index, base[position], (weight0, fraction), cosine, sine,
+                        real, imag, sum_real, sum_imag,
+                    )  # fmt: skip
             for i in range(used):
-                image[row, begin + i] += np.complex64(complex(sum_real[i], sum_imag[i]))
+                image[row, begin + i] += np.complex64(complex(sums[0, i], sums[1, i]))

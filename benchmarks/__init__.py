@@ -1,0 +1,1 @@
+"""Speed and accuracy of vinsar's kernels against peers, in one run: `./run benchmarks`."""

@@ -1,0 +1,116 @@
+"""The table, the JSON and the plots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def table(result):
+    """Return the figures as Markdown."""
+    lines = []
+    where = result["machine"]
+    lines += [
+        f"{where['processor']} ({where['microarchitecture']}"
+        f"{', AVX-512' if where['avx512'] else ''}), {where['cores']} cores, load "
+        f"{where['load']:.1f} at the start; Python {where['python']}, "
+        + ", ".join(f"{name} {version}" for name, version in where["versions"].items())
+        + ".",
+        "",
+        "| kernel | contender | rate per core | quartiles | error |",
+        "|---|---|---|---|---|",
+    ]
+    kernels = result["kernels"]
+    for kernel, part in kernels.items():
+        for row in part["rows"]:
+            low, high = (row["rate"] * row["median_s"] / s for s in row["quartiles_s"][::-1])
+            error = f"{row['error_db']:.1f} dB" if row["error_db"] is not None else ""
+            if "agreement" in part and row["contender"].startswith("vinsar"):
+                error = f"{100 * part['agreement']:.3f} % like the march"
+            lines.append(
+                f"| {kernel} | {row['contender']} | {row['rate']:.3g} {row['unit']} | "
+                f"{low:.3g} .. {high:.3g} | {error} |"
+            )
+    lines += ["", "| kernel | ours | against | goal | reached |", "|---|---|---|---|---|"]
+    for kernel, part in kernels.items():
+        for ratio in part["ratios"]:
+            lines.append(
+                f"| {kernel} | {ratio['ours']} | {ratio['against']} | {ratio['goal']:g} x | "
+                f"{ratio['ratio']:.1f} x |"
+            )
+    for row in result["frames"]:
+        goal = "20 frames/s" if row["workers"] == 2 else ""
+        lines.append(
+            f"| chain, echo to coded DEM, 5 cm grid | {row['workers']} core(s) | real time | "
+            f"{goal} | {row['frames_per_s']:.1f} frames/s |"
+        )
+    for title, key in (
+        ("Stages of the paper's study, a core's time", "stages"),
+        ("The same on the grid of 5 cm", "stages_coarse"),
+    ):
+        lines += ["", f"{title}:", "", "| stage | ms | share |", "|---|---|---|"]
+        for row in result[key]:
+            ms, share = 1000 * row["seconds"], 100 * row["share"]
+            lines.append(f"| {row['stage']} | {ms:.1f} | {share:.0f} % |")
+    if "scaling" in result:
+        lines += [
+            "",
+            "| against | computed | sizes | seconds | peak MB | slope of time | of memory |",
+            "|---|---|---|---|---|---|---|",
+        ]
+        for axis, part in result["scaling"].items():
+            points = part["points"]
+            lines.append(
+                f"| {axis} | {part['kind']} | {points[0]['size']} .. {points[-1]['size']} | "
+                f"{points[0]['seconds']:.3g} .. {points[-1]['seconds']:.3g} | "
+                f"{points[0]['peak_mb']:.0f} .. {points[-1]['peak_mb']:.0f} | "
+                f"{part['slope_time']:.2f} | {part['slope_memory']:.2f} |"
+            )
+        large = result["large"]
+        lines += [
+            "",
+            "40 m x 40 m at 2 cm (4.0 million pixels), 321 positions, 801 frequencies, two "
+            f"channels, one core: {large['seconds']:.1f} s, of which {large['compress_s']:.1f} s "
+            f"for range compression; {large['peak_mb']:.0f} MB.",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def plot_kernels(result, path):
+    """Plot speed against error."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    for axes, kernel in zip(figure.subplots(1, 2), ("back-projection", "echo"), strict=True):
+        rows = [row for row in result["kernels"][kernel]["rows"] if row["error_db"] is not None]
+        for row in rows:
+            ours = row["contender"].startswith("vinsar")
+            axes.scatter(row["error_db"], row["rate"], color="C0" if ours else "0.5")
+            axes.annotate(
+                row["contender"], (row["error_db"], row["rate"]), fontsize=7,
+                xytext=(3, 3), textcoords="offset points",
+            )  # fmt: skip
+        axes.set(
+            xlabel="error, dB", ylabel=f"{rows[0]['unit']}, one core", yscale="log", title=kernel
+        )
+        axes.margins(x=0.25)
+    figure.savefig(path, dpi=150, metadata={"Software": None})
+
+
+def plot_scaling(result, path):
+    """Plot time and memory against the sizes, with slopes."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 5), layout="constrained")
+    grid = figure.subplots(2, len(result["scaling"]))
+    for (axis, part), (upper, lower) in zip(result["scaling"].items(), grid.T, strict=True):
+        sizes = [point["size"] for point in part["points"]]
+        for axes, key, slope, label in (
+            (upper, "seconds", part["slope_time"], "time, s"),
+            (lower, "peak_mb", part["slope_memory"], "peak memory, MB"),
+        ):
+            values = np.array([point[key] for point in part["points"]])
+            axes.loglog(sizes, values, "o-", label=f"slope {slope:.2f}")
+            axes.set(xlabel=axis, ylabel=label)
+            axes.legend(fontsize=7)
+        upper.set_title(f"{part['kind']} against {axis}", fontsize=8)
+    figure.savefig(path, dpi=120, metadata={"Software": None})

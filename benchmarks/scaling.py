@@ -1,0 +1,141 @@
+"""Time and peak memory against the sizes of the problem, each point in a process of its own.
+
+A process that runs this file with a case on its command line prints what the case took.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+
+# What grows along each axis, from small to large; all else is the paper's.
+AXES = {
+    "pixels": [{"kind": "images", "side": side} for side in (256, 512, 1024, 2048)],
+    "positions": [{"kind": "images", "positions": count} for count in (81, 162, 324, 648)],
+    "facets": [{"kind": "echo", "facets": count} for count in (25_000, 50_000, 100_000, 200_000)],
+    "frequencies": [{"kind": "profiles", "frequencies": n} for n in (401, 801, 1601, 3201)],
+    "cores": [{"kind": "images", "side": 1024, "workers": n} for n in (1, 2)],
+}
+LARGE = {"kind": "large"}
+
+
+def size(axis, case):
+    """Return a case's place on its axis."""
+    if axis == "pixels":
+        return case["side"] ** 2
+    return case[{"positions": "positions", "facets": "facets", "frequencies": "frequencies",
+                 "cores": "workers"}[axis]]  # fmt: skip
+
+
+def measure(rounds):
+    """Return all axes with fitted slopes, and the large scene."""
+    result = {}
+    for axis, cases in AXES.items():
+        points = [
+            {"size": size(axis, case)} | min((run(case) for _ in range(rounds)),
+                                             key=lambda point: point["seconds"])
+            for case in cases
+        ]  # fmt: skip
+        logs = np.log([[p["size"], p["seconds"], p["peak_mb"]] for p in points]).T
+        result[axis] = {
+            "kind": cases[0]["kind"],
+            "points": points,
+            "slope_time": float(np.polyfit(logs[0], logs[1], 1)[0]),
+            "slope_memory": float(np.polyfit(logs[0], logs[2], 1)[0]),
+        }
+    return result, run(LARGE)
+
+
+def run(case):
+    """Run a case in a process of its own."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "benchmarks.scaling", json.dumps(case)]
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise RuntimeError(f"{case}: {done.stderr[-2000:]}")
+    return json.loads(done.stdout)
+
+
+def peak_mb():
+    """Return the largest resident size so far, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def main(case):
+    """Compute a case and print its seconds (wall clock) and peak memory beyond a small one's."""
+    import dask
+
+    workers = case.get("workers", 1)
+    with dask.config.set(scheduler="threads", num_workers=workers):
+        compute(case | {"side": 32, "positions": 3, "facets": 100, "small": True})()
+        before = peak_mb()
+        work = compute(case)
+        begin = time.perf_counter()
+        detail = work()
+        seconds = time.perf_counter() - begin
+    print(json.dumps({"seconds": seconds, "peak_mb": peak_mb() - before} | (detail or {})))
+
+
+def compute(case):
+    """Return a function that computes the case; its inputs are made here."""
+    from benchmarks.kernels import facets
+    from vinsar import echo, imaging, radar, trajectory, variables
+
+    large = case["kind"] == "large"
+    count = case.get("positions", 321 if large else 81)
+    frequency = radar.frequencies(13e9, 15e9, case.get("frequencies", 801 if large else 401))
+    rail = trajectory.rail(
+        aperture_length_m=0.01 * (count - 1), position_spacing_m=0.01, rail_height_m=2.0,
+        baseline_m=0.3, baseline_angle_deg=90.0,
+    )  # fmt: skip
+    if case["kind"] == "echo":
+        scatterers = facets(case["facets"])
+
+        def work():
+            echo.simulate(scatterers, rail, frequency=frequency)
+
+        return work
+    rng = np.random.default_rng(0)
+    shape = (2, count, frequency.size)
+    signal = variables.dataset(
+        "echo",
+        {"echo": rng.normal(size=(*shape, 2)).view(complex)[..., 0]},
+        {"frequency": frequency},
+    )
+    if case["kind"] == "profiles":
+
+        def work():
+            imaging.compress(signal, near_range_m=10.0, far_range_m=17.0)
+
+        return work
+    if large and not case.get("small"):
+        x, y = 0.02 * np.arange(2001) - 20, 10 + 0.02 * np.arange(2001)
+    else:
+        side = case.get("side", 512)
+        spacing = 5.12 / side
+        x, y = spacing * (np.arange(side) - side / 2), 10 + spacing * np.arange(side)
+
+    def work():
+        near, far = trajectory.range_extent(rail, x, y)
+        begin = time.perf_counter()
+        profiles = imaging.compress(signal, near_range_m=near, far_range_m=far)
+        compressed = time.perf_counter() - begin
+        imaging.backproject(profiles, rail, x=x, y=y)
+        return {"compress_s": compressed, "pixel_positions": 2 * x.size * y.size * count}
+
+    return work
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))

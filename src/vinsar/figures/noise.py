@@ -1,0 +1,93 @@
+"""The spread of the height error against the signal-to-noise ratio."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from vinsar import baseline, config, variables
+from vinsar.figures import style, sweeps
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from vinsar.pipeline import Products
+
+_NORMAL = 1.4826
+_PARTS = (
+    ("std", "whole_scene", 1.0, sweeps.Look("std, whole scene", style.INK, "-", "o")),
+    (
+        "std",
+        "visible_ground",
+        1.0,
+        sweeps.Look("std, visible ground", style.BLUE, (0, (4, 1.5)), "s"),
+    ),
+    (
+        "mad",
+        "visible_ground",
+        _NORMAL,
+        sweeps.Look("1.48 MAD, visible ground", style.ORANGE, (0, (4, 1.2, 1, 1.2)), "^"),
+    ),
+)
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw the spread of the height error against the signal-to-noise ratio.
+
+    Parameters
+    ----------
+    products
+        ``sweeps/snr``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    sweep = variables.swept(products["sweeps/snr"], "echo_snr_db").sortby("echo_snr_db")
+    ratio = sweep["echo_snr_db"].values
+    radar = config.swept_section(study, "snr", "radar")
+    seen = baseline.view(radar, config.swept_section(study, "snr", "scene"))
+    coherence = baseline.noise_coherence(ratio) * baseline.geometric_coherence(
+        seen.across(radar.baseline_m), seen.critical_baseline
+    )
+    count = sweeps.looks(study, "snr")
+    bound = 100 * seen.height_std_bound(radar.baseline_m, coherence, count)
+    figure = style.new_figure(style.ONE_COLUMN_MM, 91.0)
+    axes = style.place(figure, 13.0, 33.0, 72.0, 52.0)
+    values = []
+    for name, region, scale, look in _PARTS:
+        data = 100 * scale * sweep[name].sel(region=region)
+        sweeps.curve(axes, ratio, data, look)
+        values.append(data.values)
+    handles, _ = axes.get_legend_handles_labels()
+    handles.append(sweeps.band_patch())
+    handles += axes.plot(
+        ratio,
+        bound,
+        color=style.GREY,
+        linestyle="--",
+        label=f"bound, level ground, {count:.1f} looks",
+    )
+    random = 100 * float(seen.random_phase_std(radar.baseline_m))
+    handles.append(
+        axes.axhline(
+            random,
+            color=style.GREY,
+            linestyle=":",
+            linewidth=0.9,
+            label=f"random phase: {random:.1f} cm",
+        )
+    )
+    limits = sweeps.around(*values, bound, [random])
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    sweeps.log_axis(axes.yaxis, limits)
+    axes.xaxis.set_major_locator(style.round_ticks(7))
+    axes.set_xlabel("signal-to-noise ratio of a resolution cell (dB)")
+    axes.set_ylabel("height error (cm)")
+    axes.set_title("Spread of the height error under thermal noise")
+    sweeps.legend(figure, handles, 13.0, 2.0, 1)
+    return figure

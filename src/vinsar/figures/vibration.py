@@ -1,0 +1,130 @@
+"""Fig. 5: the height under position errors along three axes, and the focus that they leave."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from vinsar import baseline, config, variables
+from vinsar.figures import style, sweeps
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from vinsar.pipeline import Products
+
+_LOOKS = {
+    "x": sweeps.Look("error along x (the rail)", style.BLUE, "-", "o"),
+    "y": sweeps.Look("along y (ahead)", style.ORANGE, (0, (4, 1.5)), "s"),
+    "z": sweeps.Look("along z (up)", style.INK, (0, (4, 1.2, 1, 1.2)), "^"),
+}
+_MODES = {"common": "(a) common to both antennas", "independent": "(b) independent"}
+_HEIGHT_MM = 79.0
+_LEFTS, _BOTTOM, _WIDTH, _TALL = (12.0, 69.0, 131.0), 21.0, 46.0, 52.0
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw Fig. 5.
+
+    Parameters
+    ----------
+    products
+        ``sweeps/vibration`` and ``truth``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    sweep = variables.swept(
+        products["sweeps/vibration"], "motion_channels", "motion_axis", "motion_level_wavelengths"
+    )
+    deviation = sweep["std"].sel(region="whole_scene")
+    relief = float(products["truth"]["height"].std())
+    radar = config.swept_section(study, "vibration", "radar")
+    seen = baseline.view(radar, config.swept_section(study, "vibration", "scene"))
+    random = float(seen.random_phase_std(radar.baseline_m))
+    figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
+    # One scale for both panels: they are to be compared.
+    limits = sweeps.around(100 * deviation.values, [100 * relief, 100 * random])
+    modes = [mode for mode in _MODES if mode in sweep["motion_channels"].values]
+    handles: list[Any] = []
+    for mode, left in zip(modes, _LEFTS, strict=False):
+        axes = style.place(figure, left, _BOTTOM, _WIDTH, _TALL)
+        part = deviation.sel(motion_channels=mode)
+        _heights(axes, part, limits)
+        handles = _references(axes, part, relief, random)
+        axes.set_title(_MODES[mode])
+        if left == _LEFTS[0]:
+            axes.set_ylabel("height std, whole scene (cm)")
+    axes = style.place(figure, _LEFTS[2], _BOTTOM, _WIDTH, _TALL)
+    _focus(axes, sweep["point_gain"].sel(motion_channels=modes[0]))
+    curves, _ = axes.get_legend_handles_labels()
+    sweeps.legend(figure, [*curves, sweeps.band_patch(), *handles], _LEFTS[0], 2.0, 4)
+    return figure
+
+
+def _levels(axes: Axes, levels: Any) -> None:
+    """Scale the x axis: logarithmic above the lowest level, and with a place for zero."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter
+
+    positive = levels[levels > 0]
+    least = float(positive.min()) if positive.size else 1.0
+    axes.set_xscale("symlog", linthresh=least, linscale=0.6)
+    decades = [10.0**n for n in range(-6, 4)]
+    marks = [0.0, *(v for v in decades if least <= v <= levels.max())]
+    axes.xaxis.set_major_locator(FixedLocator(marks))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
+    axes.xaxis.set_minor_locator(
+        FixedLocator([v * n for v in decades for n in range(2, 10) if least <= v * n])
+    )
+    axes.set_xlim(-0.2 * least, 1.25 * max(float(levels.max()), least))
+    axes.set_xlabel("level: std of the error (wavelengths)")
+
+
+def _axes_of(data: xr.DataArray) -> list[str]:
+    return [name for name in _LOOKS if name in data["motion_axis"].values]
+
+
+def _heights(axes: Axes, deviation: xr.DataArray, limits: tuple[float, float]) -> None:
+    ordered = deviation.sortby("motion_level_wavelengths")
+    levels = ordered["motion_level_wavelengths"].values
+    for name in _axes_of(ordered):
+        sweeps.curve(axes, levels, ordered.sel(motion_axis=name), _LOOKS[name], scale=100)
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    sweeps.log_axis(axes.yaxis, limits)
+    _levels(axes, levels)
+
+
+def _references(axes: Axes, deviation: xr.DataArray, relief: float, random: float) -> list[Any]:
+    none = deviation.sel(motion_level_wavelengths=deviation["motion_level_wavelengths"] == 0)
+    lines = []
+    if none.size:
+        floor = 100 * float(none.mean())
+        lines.append((floor, f"no error: {floor:.1f} cm", "-"))
+    lines += [
+        (100 * relief, f"level DEM: {100 * relief:.1f} cm", "--"),
+        (100 * random, f"random phase: {100 * random:.1f} cm", ":"),
+    ]
+    return [
+        axes.axhline(at, label=text, color=style.GREY, linestyle=line, linewidth=0.9, zorder=0.5)
+        for at, text, line in lines
+    ]
+
+
+def _focus(axes: Axes, gain: xr.DataArray) -> None:
+    # Both antennas lose focus alike: their errors have one distribution.
+    ordered = gain.sortby("motion_level_wavelengths").mean("channel")
+    levels = ordered["motion_level_wavelengths"].values
+    for name in _axes_of(ordered):
+        sweeps.curve(axes, levels, ordered.sel(motion_axis=name), _LOOKS[name])
+    axes.set_ylim(0, 1.05)
+    axes.yaxis.set_major_locator(style.round_ticks(6))
+    axes.set_ylabel("amplitude left (1)")
+    axes.set_title("(c) focus of a point target")
+    _levels(axes, levels)

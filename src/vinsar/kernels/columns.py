@@ -1,0 +1,54 @@
+"""Resampling the columns of an image from the places where their pixels belong."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vinsar.kernels.compiling import kernel
+
+
+@kernel
+def resample(values: np.ndarray, place: np.ndarray, axis: np.ndarray, out: np.ndarray) -> None:
+    """Interpolate each column linearly at the axis, from values at places of their own.
+
+    Parameters
+    ----------
+    values, place
+        Values and where they belong (row, column), float64; NaN places do not count.
+    axis
+        Where to interpolate (row,), evenly spaced and rising.
+    out
+        Output (row, column), float64; NaN more than a step of the axis beyond the outermost place.
+    """
+    rows, columns = values.shape
+    spacing = axis[1] - axis[0]
+    x, y = np.empty(rows), np.empty(rows)
+    for column in range(columns):
+        count, rising = 0, True
+        for row in range(rows):
+            if np.isfinite(place[row, column]):
+                x[count], y[count] = place[row, column], values[row, column]
+                rising = rising and (count == 0 or x[count] >= x[count - 1])
+                count += 1
+        if count == 0:
+            out[:, column] = np.nan
+            continue
+        if not rising:
+            # Stable, so that places that coincide stay in the order of the image.
+            order = np.argsort(x[:count], kind="mergesort")
+            x[:count], y[:count] = x[order], y[order]
+        left = 0
+        for row in range(axis.size):
+            target = axis[row]
+            if target < x[0] - spacing or target > x[count - 1] + spacing:
+                out[row, column] = np.nan
+                continue
+            while left < count - 1 and x[left + 1] <= target:
+                left += 1
+            if target <= x[0]:
+                out[row, column] = y[0]
+            elif left == count - 1:
+                out[row, column] = y[count - 1]
+            else:
+                share = (target - x[left]) / (x[left + 1] - x[left])
+                out[row, column] = y[left] + share * (y[left + 1] - y[left])

@@ -1,0 +1,367 @@
+"""The kernels' fast ways against slow ones, their bits against threads, their caches."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import dask
+import numpy as np
+import pytest
+
+from vinsar import echo, filtering, imaging, radar, scene, trajectory, variables, visibility
+from vinsar.kernels import (
+    backprojection,
+    columns,
+    functions,
+    lookup,
+    multilook,
+    patches,
+    splat,
+)
+from vinsar.kernels.compiling import kernel
+
+LIGHT = 299_792_458.0
+PACKAGE = Path(imaging.__file__).parent
+X, Y = np.linspace(-2.5, 2.5, 251), np.linspace(10.0, 10.6, 31)
+
+
+def decibels(found, exact):
+    return 20 * np.log10(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+
+
+@kernel
+def call_phasor(turn, cosine, sine):
+    for i in range(turn.size):
+        cosine[i], sine[i] = functions.phasor(turn[i])
+
+
+@kernel
+def call_copy(pairs, index, base, table, out0, out1, out2, out3):
+    lookup.copy(pairs, index, base, table, (out0, out1, out2, out3))
+
+
+@kernel
+def call_pairs(reach):
+    return lookup.pairs_for(reach)
+
+
+def test_the_phasor_errs_below_minus_105_db():
+    turn = np.linspace(-0.5, 0.5, 100_001).astype(np.float32)
+    cosine, sine = np.empty_like(turn), np.empty_like(turn)
+    call_phasor(turn, cosine, sine)
+    exact = np.exp(2j * np.pi * turn.astype(float))
+    assert 20 * np.log10(np.abs(cosine + 1j * sine - exact).max()) < -105
+
+
+@pytest.mark.parametrize(("pairs", "reach"), [(1, 13), (2, 29)])
+@pytest.mark.parametrize("base", [40, -3, 980])
+def test_registers_give_the_samples_that_single_copies_give(pairs, reach, base):
+    if call_pairs(reach) != pairs:
+        pytest.skip("this machine has no AVX-512")
+    rng = np.random.default_rng(pairs)
+    table = rng.random(1000 + lookup.PADDING).astype(np.float32)
+    middle = np.repeat(rng.integers(30, 60, 8), lookup.LANES)
+    index = (middle + rng.integers(-reach, reach + 1, middle.size)).astype(np.int32)
+    index[lookup.LANES // 2 :: lookup.LANES] = middle[:: lookup.LANES]
+    if base != 40:
+        # Places beyond either end give some sample or other: what counts is that it is one.
+        index[:] = rng.integers(-(2**31), 2**31, index.size)
+    ways = np.zeros((2, 4, index.size), np.float32)
+    for way, number in zip(ways, (pairs, 0), strict=True):
+        call_copy(number, index, np.int64(base), table, *way)
+    if base == 40:
+        np.testing.assert_array_equal(ways[0], ways[1])
+    assert np.isin(ways, table).all()
+
+
+def test_wide_and_narrow_groups_get_their_windows():
+    few = [call_pairs(reach) for reach in (0, 13, 14, 29, 30, 1000)]
+    assert few in ([1, 1, 2, 2, 0, 0], [0] * 6)
+
+
+@pytest.fixture(scope="module")
+def signal(scatterers, rail):
+    rng = np.random.default_rng(3)
+    place = rng.uniform([-2.5, 10.0, 0.0], [2.5, 10.6, 0.0], (500, 3))
+    frequency = radar.frequencies(13e9, 15e9, 401)
+    return echo.simulate(scatterers(place, rng.random(500)), rail, frequency=frequency)
+
+
+def image(signal, antennas, x=X, y=Y, **options):
+    near, far = trajectory.range_extent(antennas, x, y)
+    profiles = imaging.compress(signal, near_range_m=near - 0.1, far_range_m=far + 0.1, **options)
+    return imaging.backproject(profiles, antennas, x=x, y=y)["image"].values
+
+
+# Grids coarser and finer than the positions' spacing of 1 cm, and one beyond all windows.
+GRIDS = [(X, Y), (np.linspace(-0.3, 0.3, 121), Y), (np.linspace(-2.5, 2.5, 21), Y)]
+
+
+@pytest.mark.parametrize(("x", "y"), GRIDS)
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_the_rail_is_imaged_like_any_positions(signal, rail, interpolation, x, y):
+    # A shift by 2 nm is nothing to the image, but too much for a rail.
+    other = rail.copy(deep=True)
+    other["transmitter"].values[:, 7] += 2e-9
+    ways = [
+        image(signal, antennas, x, y, interpolation=interpolation) for antennas in (rail, other)
+    ]
+    # Single precision adds less than -100 dB; 2 nm in one of 81 positions turn it by 2e-6.
+    assert decibels(*ways) < -100
+    assert not np.array_equal(*ways)
+
+
+@pytest.mark.parametrize("count", [1, 15, 16, 17, 130, 300])
+def test_images_of_any_width_hold_the_same_pixels(signal, rail, count):
+    wide = np.linspace(-1.5, 1.49, 300)
+    whole = image(signal, rail, wide, Y[:3])
+    part = image(signal, rail, wide[:count], Y[:3])
+    np.testing.assert_allclose(part, whole[..., :count], atol=1e-5 * np.abs(whole).max())
+
+
+@pytest.mark.parametrize(("oversampling", "expected"), [(4, -79), (6, -93), (8, -103)])
+def test_cubic_interpolation_errs_as_published(scatterers, rail, oversampling, expected):
+    rng = np.random.default_rng(4)
+    frequency = radar.frequencies(13e9, 15e9, 101)
+    place = rng.uniform([-0.6, 5.4, 0.0], [0.6, 6.6, 0.0], (800, 3))
+    data = echo.simulate(scatterers(place), rail, frequency=frequency, accuracy_db=None)
+    x, y = np.linspace(-0.6, 0.6, 25), np.linspace(5.4, 6.6, 21)
+    grid = np.stack([*np.meshgrid(x, y), np.zeros((21, 25))], axis=-1)
+    path = 2 * np.linalg.norm(grid - rail["transmitter"].values[:, :, None, None], axis=-1)
+    exact = sum(
+        np.einsum(
+            "cl,clyx->cyx", data["echo"].values[..., k], np.exp(2j * np.pi * f / LIGHT * path)
+        )
+        for k, f in enumerate(frequency)
+    )
+    found = image(data, rail, x, y, oversampling=oversampling, interpolation="cubic")
+    error_db = decibels(found, exact / (81 * 101))
+    # 2 zeta(8) (1 / 2m)^8 / 9 of a full band's power; speckle over 200 cells scatters by 1 dB.
+    assert error_db == pytest.approx(expected, abs=3)
+
+
+def test_splatting_is_the_adjoint_of_back_projection():
+    rng = np.random.default_rng(6)
+    x, y = 0.013 * np.arange(40) - 0.26, 5 + 0.017 * np.arange(30)
+    surface = 0.1 * rng.random((30, 40))
+    antennas = np.stack([np.linspace(-0.4, 0.4, 5), np.zeros(5), np.full(5, 2.0)], axis=1)
+    others = antennas + np.array([0.3, -0.1, 0.2])
+    step, cycles = 0.006, 93.4
+    period = 1200
+    amplitude = rng.random((30, 40)).astype(np.float32)
+    profile = rng.normal(size=(5, period, 2)).astype(np.float32)
+    padded = np.zeros((2, 5, period + lookup.PADDING), np.float32)
+    padded[..., :period] = np.moveaxis(profile, -1, 0)
+    focused = np.zeros((30, 40), np.complex64)
+    backprojection.accumulate(
+        focused, x, y, surface, antennas, others, padded[0], padded[1], 0.0, step, cycles, True
+    )
+    place = np.stack([*np.meshgrid(x, y), surface]).reshape(3, -1)
+    spread = np.zeros((5, period + splat.TAPS), np.complex64)
+    for bins, out, back in zip(spread, antennas, others, strict=True):
+        splat.spread(
+            place, amplitude.ravel(), np.ones(1200, bool), out, back, 0.0, cycles / 2,
+            1 / (2 * step * period), bins,
+        )  # fmt: skip
+    # A facet in bin k adds to k and on; back-projection reads there from sample k - 1 on.
+    by_range = np.vdot(spread[:, 1 : period + 1], profile.view(np.complex64)[..., 0])
+    by_pixel = np.vdot(amplitude, focused)
+    # Sums of 6000 terms in single precision: the norms times some roundings of 6e-8.
+    scale = np.linalg.norm(amplitude) * np.linalg.norm(focused)
+    assert abs(by_range - by_pixel) < 1e-6 * scale
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1.0])
+@pytest.mark.parametrize(("count", "size"), [(401, 0.05), (200, 0.05), (401, 0.03)])
+def test_the_splat_errs_less_than_it_says_on_the_papers_facets(rail, jitter, count, size):
+    terrain = scene.terrain(
+        "peaks", x_min_m=-2.5, x_max_m=2.5, y_min_m=10.0, y_max_m=16.0, spacing_m=0.02,
+        peak_height_m=0.3, reflectivity_offset=0.5,
+    )  # fmt: skip
+    facets = scene.facets(
+        terrain, facet_size_m=size, facet_jitter=jitter, rng=np.random.default_rng(1)
+    )
+    few = rail.isel(position=[0, 60])
+    seen = visibility.facet_visibility(terrain, facets, few)
+    frequency = radar.frequencies(13e9, 15e9, count)
+    ways = [
+        echo.simulate(facets, few, seen, frequency=frequency, spreading=True, accuracy_db=accuracy)
+        for accuracy in (echo.MOST_ACCURATE_SPLAT_DB, None)
+    ]
+    assert decibels(*(way["echo"].values for way in ways)) < echo.MOST_ACCURATE_SPLAT_DB
+
+
+def by_threads(compute):
+    """The bits of a result on one thread, on two and on five."""
+    results = []
+    for options in ({"scheduler": "synchronous"}, *({"num_workers": n} for n in (2, 5))):
+        with dask.config.set(scheduler="threads"), dask.config.set(**options):
+            results.append(compute().tobytes())
+    return results
+
+
+def test_results_do_not_depend_on_the_threads(signal, rail, scatterers):
+    rng = np.random.default_rng(7)
+    noise = rng.normal(size=(90, 80, 2)).view(complex)[..., 0].astype(np.complex64)
+    cloud = scatterers(rng.uniform([-2, 10, 0], [2, 15, 0.3], (3000, 3)))
+    frequency = radar.frequencies(13e9, 15e9, 51)
+    for compute in (
+        lambda: filtering.goldstein(noise, alpha=0.7, patch_px=32, step_px=4),
+        lambda: image(signal, rail),
+        lambda: image(signal, rail.assign(receiver=rail["receiver"] + 0.1)),
+        lambda: echo.simulate(cloud, rail, frequency=frequency, accuracy_db=-85)["echo"].values,
+        lambda: echo.simulate(cloud, rail, frequency=frequency, accuracy_db=-110)["echo"].values,
+    ):
+        assert len(set(by_threads(compute))) == 1
+
+
+def test_smoothed_spectra_are_sums_over_3_x_3_that_wrap_around():
+    rng = np.random.default_rng(8)
+    spectra = rng.normal(size=(2, 3, 7, 5, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    spectra[1, 1] = 0
+    weights = np.empty(spectra.shape, np.float32)
+    patches.smooth(spectra, weights)
+    shifts = [(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1)]
+    exact = sum(np.roll(np.abs(spectra), shift, axis=(-2, -1)) for shift in shifts)
+    peak = exact.max(axis=(-2, -1), keepdims=True)
+    np.testing.assert_allclose(weights, exact / np.where(peak > 0, peak, 1), atol=1e-6)
+
+
+@pytest.mark.parametrize("holes", [0.0, 0.3])
+@pytest.mark.parametrize("shuffle", [0.0, 2.0])
+def test_columns_are_resampled_as_numpy_interpolates(holes, shuffle):
+    rng = np.random.default_rng(9)
+    axis = np.linspace(0, 3, 31)
+    place = axis[:, None] + shuffle * rng.random((31, 6))
+    place[rng.random(place.shape) < holes] = np.nan
+    values, found = rng.random(place.shape), np.empty(place.shape)
+    columns.resample(values, place, axis, found)
+    for column in range(6):
+        known = np.isfinite(place[:, column])
+        order = np.argsort(place[known, column], kind="stable")
+        at = place[known, column][order]
+        exact = np.interp(axis, at, values[known, column][order])
+        exact[(axis < at[0] - 0.1) | (axis > at[-1] + 0.1)] = np.nan
+        np.testing.assert_allclose(found[:, column], exact, atol=1e-12)
+
+
+def test_a_coherence_of_few_rows_is_whole():
+    rng = np.random.default_rng(10)
+    lower, upper = rng.normal(size=(2, 2, 30, 2)).view(complex)[..., 0]
+    found = np.empty((2, 30))
+    multilook.coherence(lower, upper, 3, found)
+    part = np.s_[:, 4:11]
+    power = np.sum(np.abs(lower[part]) ** 2) * np.sum(np.abs(upper[part]) ** 2)
+    exact = np.abs(np.vdot(upper[part], lower[part])) / np.sqrt(power)
+    np.testing.assert_allclose(found[:, 7], exact)
+
+
+def test_positions_that_are_not_numbers_are_refused(scatterers, rail):
+    facets = scatterers([[0.0, 10.0, 0.0], [np.nan, 11.0, 0.0]])
+    with pytest.raises(ValueError, match="not a number"):
+        echo.simulate(facets, rail, frequency=np.array([13e9, 14e9]))
+    terrain = variables.dataset(
+        "terrain",
+        {"height": np.zeros((5, 5)), "reflectivity": np.ones((5, 5))},
+        {"x": np.arange(5.0), "y": 10 + np.arange(5.0)},
+    )
+    with pytest.raises(ValueError, match="not a number"):
+        visibility.visible_points(
+            terrain, np.array([[0.0, 0.0, np.inf]]), facets["facet_position"].values
+        )
+
+
+IMAGE = """
+import numpy as np
+from vinsar.kernels import {module}
+rng = np.random.default_rng(0)
+x, y = np.linspace(-0.4, 0.4, 33), np.linspace(5, 6, 4)
+antennas = np.stack([np.linspace(-0.1, 0.1, 5), np.zeros(5), np.full(5, 2.0)], axis=1)
+profiles = rng.normal(size=(2, 5, 700)).astype(np.float32)
+images = np.zeros((2, 4, 33), np.complex64)
+for image, cubic in zip(images, (False, True)):
+    {module}.accumulate(image, {arguments}, profiles[0], profiles[1], 4.0, 0.01, 93.4, cubic)
+np.save({path!r}, images)
+"""
+ARGUMENTS = {
+    "backprojection": "x, y, np.zeros((4, 33)), antennas, antennas",
+    "rail": "x[0], 0.025, y, np.zeros(4), antennas[0], antennas[0], 0.05, 1, 2",
+}
+
+
+def python(code, **environment):
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env={k: v for k, v in os.environ.items() if not k.startswith("NUMBA")} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+@pytest.mark.parametrize("module", ARGUMENTS)
+def test_machines_without_avx_512_and_plain_python_make_the_same_image(tmp_path, module):
+    ways = {
+        "here": {},
+        "portable": {
+            "NUMBA_CPU_NAME": "generic",
+            "NUMBA_CPU_FEATURES": "",
+            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        },
+        "python": {"NUMBA_DISABLE_JIT": "1"},
+    }
+    made = {}
+    for name, environment in ways.items():
+        path = str(tmp_path / f"{name}.npy")
+        code = IMAGE.format(module=module, arguments=ARGUMENTS[module], path=path)
+        python(code, PYTHONPATH=str(PACKAGE.parent), **environment)
+        made[name] = np.load(path)
+    # They round and fuse differently: single precision's -100 dB.
+    for name in ("portable", "python"):
+        for found, exact in zip(made[name], made["here"], strict=True):
+            assert decibels(found, exact) < -100
+
+
+HITS = """
+import numpy as np
+from vinsar.kernels import paths
+out = np.empty(3)
+seen = np.ones(3, bool)
+n = paths.gather(np.ones((3, 3)), np.ones(3), seen, np.zeros(3), np.zeros(3), 0.0, out, out)
+assert n == 3
+print(sum(paths.gather.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.parametrize("writable", ["source", "home", "variable", "nothing"])
+def test_compiled_kernels_are_kept_wherever_something_can_be_written(tmp_path, writable):
+    package = tmp_path / "lib" / "vinsar"
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    home = tmp_path / "home"
+    environment = {
+        "PYTHONPATH": str(package.parent),
+        "HOME": str(home),
+        "XDG_CACHE_HOME": str(home / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    if writable != "source":
+        # A file where the folder should be stops even those whom permissions do not.
+        (package / "kernels" / "__pycache__").touch()
+    if writable in ("variable", "nothing"):
+        home.touch()
+    if writable == "variable":
+        environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
+    hits = [int(python(HITS, **environment)) for _ in range(2)]
+    assert hits == [0, 0 if writable == "nothing" else 1]
+
+
+def test_the_library_starts_without_what_only_kernels_and_figures_need():
+    heavy = "numba", "scipy", "finufft", "dask", "distributed", "matplotlib", "netCDF4"
+    code = f"import sys, vinsar.pipeline; print([m for m in {heavy} if m in sys.modules])"
+    assert python(code, PYTHONPATH=str(PACKAGE.parent)).strip() == "[]"
