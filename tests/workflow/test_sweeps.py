@@ -200,15 +200,10 @@ def test_a_wrong_sweep_starts_nothing(fresh):
     assert not (fresh.folder / "results").exists()
 
 
-@pytest.mark.parametrize("by_variable", [True, False])
-def test_an_address_where_nobody_answers_ends_the_run_soon(fresh, by_variable):
+def test_an_address_where_nobody_answers_ends_the_run_soon(fresh):
     address = "tcp://127.0.0.1:9"
     begin = time.monotonic()
-    if by_variable:
-        code, said = fresh.run(DASK_SCHEDULER_ADDRESS=address)
-    else:
-        fresh.set(SWEEP.replace("address: null", f"address: {address}"))
-        code, said = fresh.run()
+    code, said = fresh.run(DASK_SCHEDULER_ADDRESS=address)
     assert time.monotonic() - begin < 15
     assert code == 1
     assert f"no Dask scheduler answers at {address}" in said

@@ -1,5 +1,6 @@
 """Run a sweep, going on from what an interrupted run has finished."""
 
+import json
 import logging
 from pathlib import Path
 
@@ -13,7 +14,8 @@ def main():
     """Run the sweep of the rule's wildcard."""
     name = snakemake.wildcards.sweep
     study = validation.check(snakemake.config)
-    code = provenance.code_digest(snakemake.input.code)
+    versions = json.dumps(provenance.library_versions(), sort_keys=True)
+    code = f"{provenance.code_digest(snakemake.input.code)} {versions}"
     output = Path(snakemake.output[0])
     finished = checkpoint.Checkpoint(output.with_name(f".{output.stem}.jsonl"), code)
     with cluster.workers(study.dask, snakemake.threads) as compute, Progress(name) as progress:

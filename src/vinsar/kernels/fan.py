@@ -76,13 +76,14 @@ def sweep(
         Output flags (count,).
     """
     rows, columns = height.shape[0], height.shape[1] - PADDING
-    count = points.shape[1]
+    along = points[1]
     x_last = x_first + x_step * (columns - 1)
     y_last = y_first + y_step * (rows - 1)
     near, far = y_first - antenna[1], y_last - antenna[1]
     left = min((x_first - antenna[0]) / near, (x_first - antenna[0]) / far)
     right = max((x_last - antenna[0]) / near, (x_last - antenna[0]) / far)
     ray_step = (right - left) / (rays - 1)
+    rays_per_slope = 1 / ray_step
     # Whole groups of lanes; whatever is computed for the lanes beyond the last ray is not used.
     room = (rays + LANES - 1) // LANES * LANES
     horizon = np.full(room + PADDING, _OPEN, np.float32)
@@ -96,6 +97,7 @@ def sweep(
     cliff = np.float32(_CLIFF * ray_step)
     before = np.empty(_CHUNK, np.float32)
     after = np.empty(_CHUNK, np.float32)
+    unclear = np.empty(_CHUNK, np.bool_)
     most = np.float32(columns - 1)
     done = 0
     for row in range(-1, rows):
@@ -123,14 +125,13 @@ def sweep(
                 z = here[i] + fraction[i] * (there[i] - here[i])
                 line[i] = max(line[i], (z - up) * inverse)
         # Points up to here lie less than a row behind the last row in the horizon.
-        limit = y_first + y_step * (row + 2) if row < rows - 1 else np.inf
-        while done < count and points[1, done] < limit:
-            size = 0
-            while size < _CHUNK and done + size < count and points[1, done + size] < limit:
-                size += 1
+        limit = y_first + y_step * (row + 2)
+        ready = done + np.searchsorted(along[done:], limit) if row < rows - 1 else along.size
+        while done < ready:
+            size = min(_CHUNK, ready - done)
             for i in range(size):
-                inverse = 1 / (points[1, done + i] - antenna[1])
-                ray = ((points[0, done + i] - antenna[0]) * inverse - left) / ray_step
+                inverse = 1 / (along[done + i] - antenna[1])
+                ray = ((points[0, done + i] - antenna[0]) * inverse - left) * rays_per_slope
                 floor = min(max(np.floor(ray), 0.0), rays - 2.0)
                 place[i] = np.int32(floor)
                 share[i] = np.float32(min(max(ray - floor, 0.0), 1.0))
@@ -139,12 +140,17 @@ def sweep(
                 k = np.uint64(place[i])
                 before[i] = horizon[k]
                 after[i] = horizon[k + np.uint64(1)]
+            some = False
             for i in range(size):
                 a, b = before[i], after[i]
                 visible[done + i] = slope[i] >= a + share[i] * (b - a)
-                if min(a, b) <= slope[i] < max(a, b) and abs(b - a) > cliff:
-                    visible[done + i] = _march(
-                        height, row, x_first, x_step, y_first - antenna[1], y_step, antenna,
-                        points[0, done + i], points[1, done + i], points[2, done + i],
-                    )  # fmt: skip
+                unclear[i] = (min(a, b) <= slope[i]) & (slope[i] < max(a, b)) & (abs(b - a) > cliff)
+                some |= unclear[i]
+            if some:
+                for i in range(size):
+                    if unclear[i]:
+                        visible[done + i] = _march(
+                            height, row, x_first, x_step, near, y_step, antenna,
+                            points[0, done + i], along[done + i], points[2, done + i],
+                        )  # fmt: skip
             done += size
