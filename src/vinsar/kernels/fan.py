@@ -126,7 +126,7 @@ def sweep(
                 line[i] = max(line[i], (z - up) * inverse)
         # Points up to here lie less than a row behind the last row in the horizon.
         limit = y_first + y_step * (row + 2)
-        ready = done + np.searchsorted(along[done:], limit) if row < rows - 1 else along.size
+        ready = done + int(np.searchsorted(along[done:], limit)) if row < rows - 1 else along.size
         while done < ready:
             size = min(_CHUNK, ready - done)
             for i in range(size):
