@@ -5,6 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 
+def number(value):
+    """Return a rate in three digits."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
 def table(result):
     """Return the figures as Markdown."""
     lines = []
@@ -27,8 +32,8 @@ def table(result):
             if "agreement" in part and row["contender"].startswith("vinsar"):
                 error = f"{100 * part['agreement']:.3f} % like the march"
             lines.append(
-                f"| {kernel} | {row['contender']} | {row['rate']:.3g} {row['unit']} | "
-                f"{low:.3g} .. {high:.3g} | {error} |"
+                f"| {kernel} | {row['contender']} | {number(row['rate'])} {row['unit']} | "
+                f"{number(low)} .. {number(high)} | {error} |"
             )
     lines += ["", "| kernel | ours | against | goal | reached |", "|---|---|---|---|---|"]
     for kernel, part in kernels.items():
@@ -39,9 +44,10 @@ def table(result):
             )
     for row in result["frames"]:
         goal = "20 frames/s" if row["workers"] == 2 else ""
+        reached = f"{row['frames_per_s']:.1f} frames/s, {1000 * row['core_seconds']:.0f} ms each"
         lines.append(
-            f"| chain, echo to coded DEM, 5 cm grid | {row['workers']} core(s) | real time | "
-            f"{goal} | {row['frames_per_s']:.1f} frames/s |"
+            f"| chain, echo to coded DEM, 5 cm grid | {row['workers']} frame(s) at once | "
+            f"real time | {goal} | {reached} |"
         )
     for title, key in (
         ("Stages of the paper's study, a core's time", "stages"),
@@ -79,26 +85,25 @@ def plot_kernels(result, path):
     """Plot speed against error."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 4), layout="constrained")
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
     for axes, kernel in zip(figure.subplots(1, 2), ("back-projection", "echo"), strict=True):
         rows = [row for row in result["kernels"][kernel]["rows"] if row["error_db"] is not None]
         for row in rows:
             ours = row["contender"].startswith("vinsar")
-            axes.scatter(row["error_db"], row["rate"], color="C0" if ours else "0.5")
-            axes.annotate(
-                row["contender"], (row["error_db"], row["rate"]), fontsize=7,
-                xytext=(3, 3), textcoords="offset points",
-            )  # fmt: skip
+            label = f"{row['contender']}: {number(row['rate'])}"
+            axes.plot(row["error_db"], row["rate"], "o" if ours else "s", label=label)
         axes.set(
             xlabel="error, dB", ylabel=f"{rows[0]['unit']}, one core", yscale="log", title=kernel
         )
-        axes.margins(x=0.25)
+        axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(0, -0.15), ncols=2)
+        axes.margins(x=0.1, y=0.15)
     figure.savefig(path, dpi=150, metadata={"Software": None})
 
 
 def plot_scaling(result, path):
     """Plot time and memory against the sizes, with slopes."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     figure = Figure(figsize=(11, 5), layout="constrained")
     grid = figure.subplots(2, len(result["scaling"]))
@@ -106,11 +111,18 @@ def plot_scaling(result, path):
         sizes = [point["size"] for point in part["points"]]
         for axes, key, slope, label in (
             (upper, "seconds", part["slope_time"], "time, s"),
-            (lower, "peak_mb", part["slope_memory"], "peak memory, MB"),
+            (lower, "peak_mb", part["slope_memory"], "peak memory beyond the inputs, MB"),
         ):
             values = np.array([point[key] for point in part["points"]])
             axes.loglog(sizes, values, "o-", label=f"slope {slope:.2f}")
-            axes.set(xlabel=axis, ylabel=label)
+            # Decades around the values, so that slopes look alike everywhere.
+            middle = np.exp(np.log(values).mean())
+            axes.set(xlabel=axis, ylim=(middle / 20, middle * 20))
+            axes.xaxis.set_major_locator(LogLocator(numticks=4))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            axes.yaxis.set_minor_formatter(NullFormatter())
             axes.legend(fontsize=7)
+            if axis == next(iter(result["scaling"])):
+                axes.set_ylabel(label)
         upper.set_title(f"{part['kind']} against {axis}", fontsize=8)
     figure.savefig(path, dpi=120, metadata={"Software": None})

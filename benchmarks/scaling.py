@@ -18,8 +18,8 @@ ROOT = Path(__file__).parents[1]
 
 # What grows along each axis, from small to large; all else is the paper's.
 AXES = {
-    "pixels": [{"kind": "images", "side": side} for side in (256, 512, 1024, 2048)],
-    "positions": [{"kind": "images", "positions": count} for count in (81, 162, 324, 648)],
+    "pixels": [{"kind": "images", "side": side} for side in (512, 1024, 2048, 4096)],
+    "positions": [{"kind": "images", "positions": count} for count in (162, 324, 648, 1296)],
     "facets": [{"kind": "echo", "facets": count} for count in (25_000, 50_000, 100_000, 200_000)],
     "frequencies": [{"kind": "profiles", "frequencies": n} for n in (401, 801, 1601, 3201)],
     "cores": [{"kind": "images", "side": 1024, "workers": n} for n in (1, 2)],

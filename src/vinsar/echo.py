@@ -156,7 +156,7 @@ def _simulate_block(
     if accuracy_db is None:
         total = _Direct(frequency, amplitude.size)
     elif accuracy_db >= MOST_ACCURATE_SPLAT_DB:
-        total = _Splat(frequency)
+        total, amplitude = _Splat(frequency), amplitude.astype(np.float32)
     else:
         total = _Transform(frequency, amplitude.size, accuracy_db)
     for index in range(len(out)):
@@ -270,7 +270,7 @@ class _Splat:
 
         self.bins[:] = 0
         splat.spread(
-            facets, amplitude.astype(np.float32), visible, transmitter, receiver, reference,
+            facets, amplitude, visible, transmitter, receiver, reference,
             self.comb.turns_per_metre, self.comb.steps_per_metre, self.bins,
         )  # fmt: skip
         self.bins[: splat.TAPS] += self.bins[self.period :]

@@ -67,6 +67,10 @@ def spread(
     weight = np.empty(_CHUNK, np.float32)
     real = np.empty(_CHUNK, np.float32)
     imag = np.empty(_CHUNK, np.float32)
+    first = np.empty(_CHUNK, np.float32)
+    second = np.empty(_CHUNK, np.float32)
+    third = np.empty(_CHUNK, np.float32)
+    fourth = np.empty(_CHUNK, np.float32)
     for begin in range(0, amplitude.size, _CHUNK):
         size = min(_CHUNK, amplitude.size - begin)
         out, back = out_buffer[:size], back_buffer[:size]
@@ -93,9 +97,10 @@ def spread(
         for i in range(size):
             cosine, sine = phasor(turn[i])
             real[i], imag[i] = weight[i] * cosine, weight[i] * sine
+            first[i], second[i], third[i], fourth[i] = spline(fraction[i])
         for i in range(size):
             if visible[begin + i]:
-                w0, w1, w2, w3 = spline(fraction[i])
+                w0, w1, w2, w3 = first[i], second[i], third[i], fourth[i]
                 a, b = real[i], imag[i]
                 # Unsigned, so that no negative index needs a look.
                 k = np.uint64(2 * index[i])
