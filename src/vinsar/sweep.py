@@ -52,16 +52,7 @@ _LEAST_BLOCKS = 64
 _SMALL_BYTES = 1 << 16
 
 _RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
-_STATISTICS = (
-    "mean",
-    "std",
-    "median",
-    "mad",
-    "percentile_95_absolute",
-    "maximum_absolute",
-    "fraction_within_tolerance",
-    "fraction_reconstructed",
-)
+_STATISTICS = tuple(name for name, own in variables.SWEEP.items() if own.dims == ("region",))
 _UNITS = {"m": "m", "hz": "Hz", "db": "dB", "deg": "degree"}
 
 

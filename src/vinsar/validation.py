@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from vinsar import config, geometry, radar
+from vinsar import colormaps, config, geometry, radar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -584,20 +584,12 @@ def _targets_imaged(radar: config.Radar, registration: config.Registration) -> I
 
 
 def _colormaps(figures: config.Figures) -> Iterator[Fault]:
-    import matplotlib as mpl
-    from cmcrameri import cm
-
     for key in ("height_colormap", "phase_colormap"):
         name = getattr(figures, key)
-        prefix, _, short = name.partition(".")
-        known = cm.cmaps if prefix == "cmc" and short else mpl.colormaps
-        wanted = short if prefix == "cmc" and short else name
-        if wanted not in known:
-            close = difflib.get_close_matches(wanted, list(known), n=1)
-            hint = (
-                f"; did you mean {'cmc.' if known is cm.cmaps else ''}{close[0]}?" if close else ""
-            )
-            yield Fault(f"figures.{key}", name, f"no colour map of matplotlib or cmcrameri{hint}")
+        try:
+            colormaps.find(name)
+        except ValueError as error:
+            yield Fault(f"figures.{key}", name, str(error))
 
 
 def _baseline_short(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:

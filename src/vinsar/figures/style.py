@@ -6,6 +6,8 @@ import functools
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from vinsar import colormaps
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -188,19 +190,8 @@ def colormap(name: str, key: str = "colormap") -> Colormap:
     ValueError
         If there is no such map; names `key` and the nearest known names.
     """
-    import difflib
-
-    import matplotlib
-
-    known: Any = matplotlib.colormaps
-    if name.startswith("cmc."):
-        # Not by their registration with Matplotlib: whatever imported them, the answer is one.
-        from cmcrameri import cm
-
-        known = {f"cmc.{short}": table for short, table in cm.cmaps.items()}
-    if name not in known:
-        near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
-        hint = f"did you mean {' or '.join(near)}?" if near else "try cmc.batlow or viridis"
-        raise ValueError(f"{key}: there is no colour map '{name}'; {hint}")
-    found: Colormap = known[name]
+    try:
+        found = colormaps.find(name)
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from None
     return found.with_extremes(bad=NO_DATA)
