@@ -113,6 +113,13 @@ _ANTENNAS = {
     "transmitter": Variable(_ANTENNA, "real", "m", "position of the transmitting antenna"),
     "receiver": Variable(_ANTENNA, "real", "m", "position of the receiving antenna"),
 }
+_SHADOW = Variable(
+    _GRID,
+    "flag",
+    "1",
+    "cell hidden from either antenna at more than half of the positions",
+    flag_meanings="visible shadow",
+)
 _ECHO = {
     "echo": Variable(
         ("channel", "position", "frequency"),
@@ -150,13 +157,7 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
         "visible_fraction": Variable(
             ("channel", "y", "x"), "real", "1", "share of the antenna positions that see the cell"
         ),
-        "shadow": Variable(
-            _GRID,
-            "flag",
-            "1",
-            "cell hidden from either antenna at more than half of the positions",
-            flag_meanings="visible shadow",
-        ),
+        "shadow": _SHADOW,
     },
     "echo": _ECHO,
     "received": _ECHO,
@@ -235,13 +236,7 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
     },
     "accuracy": {
         "height_error": Variable(_GRID, "real", "m", "height error, reconstructed minus true"),
-        "shadow": Variable(
-            _GRID,
-            "flag",
-            "1",
-            "cell hidden from either antenna at more than half of the positions",
-            flag_meanings="visible shadow",
-        ),
+        "shadow": _SHADOW,
         "mean": Variable(("region",), "real", "m", "mean height error"),
         "std": Variable(("region",), "real", "m", "standard deviation of the height error"),
         "median": Variable(("region",), "real", "m", "median height error"),
