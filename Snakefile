@@ -36,12 +36,14 @@ include: "workflow/rules/report.smk"
 rule all:
     default_target: True
     input:
-        expand("<results>/{product}.nc", product=pipeline.STAGES),
+        expand("<results>/{product}.nc", product=wanted_products()),
         expand(
             "<results>/figures/{figure}.{suffix}",
-            figure=figures.FIGURES,
+            figure=STUDY.outputs.figures,
             suffix=SUFFIXES,
         ),
         "<results>/accuracy.json",
-        "<results>/claims.json",
-        "<results>/claims.md",
+        expand(
+            "<results>/claims.{suffix}",
+            suffix=["json", "md"] if STUDY.outputs.claims else [],
+        ),

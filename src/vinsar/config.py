@@ -246,6 +246,15 @@ class Figures(Section):
     png_dpi: int = _key("resolution of the PNG files", "not given", ge=50, le=1200)
 
 
+class Outputs(Section):
+    """What `./run` makes besides the products of the chain."""
+
+    figures: Annotated[tuple[str, ...], Field(strict=False)] = _key(
+        "names of the figures; the sweeps that they show are run with them", "ours"
+    )
+    claims: bool = _key("hold the study against the paper's claims", "ours")
+
+
 Override = dict[str, Any]
 
 
@@ -301,6 +310,7 @@ class Study(Section):
     registration: Registration
     baseline_errors: BaselineErrors
     figures: Figures
+    outputs: Outputs
     dask: Dask
     variants: dict[str, Override] = _key(
         "overrides by name; `./run variants` tabulates the accuracy of each", "ours"

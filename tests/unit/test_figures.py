@@ -19,7 +19,7 @@ import yaml
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from vinsar import baseline, config, figures, geometry, pipeline, variables
+from vinsar import baseline, config, figures, geometry, pipeline, validation, variables
 from vinsar.figures import (
     acquisition,
     baselines,
@@ -871,3 +871,14 @@ def test_failed_write_leaves_the_old_file_and_no_rest(
         files.save(style.new_figure(50, 50), [path], png_dpi=50)
     assert path.read_bytes() == b"old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["fig.png"]
+
+
+def test_figures_that_cannot_be_drawn_are_refused_before_anything_runs():
+    asked = ["fig1", "fig9", "fig5", "fig1"]
+    study = make_study(outputs={"figures": asked, "claims": False})
+    study = study.model_copy(update={"sweeps": {}})
+    with pytest.raises(validation.ConfigurationError) as caught:
+        figures.check(study)
+    keys = [fault.key for fault in caught.value.faults]
+    assert keys == [f"outputs.figures[{number}]" for number in (1, 2, 3)]
+    assert "'vibration'" in caught.value.faults[1].allowed

@@ -11,11 +11,14 @@ import xarray as xr
 from vinsar import accuracy, claims, figures, pipeline, storage, validation
 
 ROOT = Path(__file__).parents[2]
-OF_SWEEPS = {"fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr"}
-FIGURE_RULES = {"fig1", "fig2", "fig3", "fig3_panels", "fig4", "figure_baseline_angle"} | OF_SWEEPS
+OF_SWEEPS = {"figure_fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr"}
+FIGURE_RULES = {
+    "figure_fig1", "figure_fig2", "figure_fig3", "figure_fig3_panels", "figure_fig4",
+    "figure_baseline_angle", *OF_SWEEPS,
+}  # fmt: skip
 AFTER_FILTERING = {
-    "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims", "fig3",
-    "fig3_panels", "fig4", "sweep", *OF_SWEEPS,
+    "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims",
+    "figure_fig3", "figure_fig3_panels", "figure_fig4", "sweep", *OF_SWEEPS,
 }  # fmt: skip
 
 
@@ -52,9 +55,11 @@ def test_the_summary_and_the_claims_are_those_of_the_library(checkout, products,
     assert (checkout.results / "claims.md").read_text() == claims.as_markdown(found)
 
 
-def test_every_figure_is_there_in_every_format(checkout):
+def test_every_figure_is_there_in_every_format(checkout, study):
     made = {path.name for path in (checkout.results / "figures").iterdir()}
-    assert made == {f"{name}.{end}" for name in figures.FIGURES for end in ("pdf", "svg", "png")}
+    assert made == {
+        f"{name}.{end}" for name in study.outputs.figures for end in ("pdf", "svg", "png")
+    }
 
 
 def test_each_product_tells_the_inputs_and_sections_that_its_stage_declares(checkout):
@@ -64,8 +69,9 @@ def test_each_product_tells_the_inputs_and_sections_that_its_stage_declares(chec
         assert set(json.loads(attributes["vinsar_configuration"])) == set(stage.sections), name
 
 
-def test_each_figure_tells_the_products_sweeps_and_sections_that_it_declares(checkout):
-    for name, figure in figures.FIGURES.items():
+def test_each_figure_tells_the_products_sweeps_and_sections_that_it_declares(checkout, study):
+    for name in study.outputs.figures:
+        figure = figures.FIGURES[name]
         text = (checkout.results / f"figures/{name}.svg").read_text(encoding="utf-8")
         found = re.search(r"<dc:description>(.*?)</dc:description>", text, re.DOTALL)
         attributes = json.loads(html.unescape(found[1]))
@@ -80,7 +86,7 @@ def test_each_figure_tells_the_products_sweeps_and_sections_that_it_declares(che
 def test_a_sweep_s_values_rerun_what_reads_it(checkout):
     rules = checkout.would_run("sweeps: {snr: {realizations: 2}}\n")
     assert {"sweep", "figure_snr"} <= rules
-    assert rules <= {"sweep", "claims", "fig5", *OF_SWEEPS}
+    assert rules <= {"sweep", "claims", *OF_SWEEPS}
 
 
 def test_a_second_run_has_nothing_to_do(checkout):
@@ -128,7 +134,7 @@ def test_a_kernel_edit_reruns_what_runs_it(checkout):
 
 def test_a_rail_height_reruns_no_facet(checkout):
     rules = checkout.would_run("radar: {rail_height_m: 2.2}\n")
-    assert {"trajectory", "echo", "fig1", "claims"} <= rules
+    assert {"trajectory", "echo", "figure_fig1", "claims"} <= rules
     assert not {"terrain", "facets"} & rules
 
 

@@ -8,14 +8,17 @@ from snakemake.logging import logger
 from vinsar import claims, figures, pipeline, provenance, sweep, validation
 
 SUFFIXES = ("pdf", "svg", "png")
-PANELS = [
-    name for name in figures.FIGURES if name.startswith("fig3") and name != "fig3"
-]
 
 try:
     STUDY = validation.check(config)
+    figures.check(STUDY)
 except validation.ConfigurationError as error:
     raise WorkflowError(str(error)) from None
+
+PANELS = [
+    name for name in STUDY.outputs.figures if name.startswith("fig3") and name != "fig3"
+]
+SINGLE = [name for name in STUDY.outputs.figures if name not in PANELS]
 
 for sentence in validation.advice(STUDY):
     logger.warning(f"Configuration: {sentence}")
@@ -51,6 +54,11 @@ def product_files(*names):
 def sweep_files(*names):
     """The files of sweeps, under the names by which the library finds them."""
     return {f"sweeps/{name}": f"<results>/sweeps/{name}.nc" for name in names}
+
+
+def drawn_as(figure):
+    """The figures that the rule of this name draws."""
+    return PANELS if figure == "fig3_panels" else [figure]
 
 
 def figure_inputs(*names):
@@ -89,3 +97,15 @@ def checked_sweep(name):
 def sweep_configuration(wildcards):
     """What a sweep's cases read: not how figures look, where it runs, nor other sweeps."""
     return configuration(*sweep.declared()) | {"sweep": checked_sweep(wildcards.sweep)}
+
+
+def wanted_products():
+    """The products that the study's outputs need, and the heights with their errors."""
+    read = {
+        name
+        for figure in STUDY.outputs.figures
+        for name in figures.FIGURES[figure].inputs
+    }
+    if STUDY.outputs.claims:
+        read |= {*claims.INPUTS}
+    return list(pipeline.needed({*read, "accuracy", "focus"}))

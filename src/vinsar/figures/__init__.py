@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+from vinsar import validation
 from vinsar.figures import (
     acquisition,
     baselines,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from vinsar import config
     from vinsar.pipeline import Products
 
-__all__ = ["FIGURES", "Figure", "colormap", "save"]
+__all__ = ["FIGURES", "Figure", "check", "colormap", "save"]
 
 
 @dataclass(frozen=True)
@@ -89,3 +90,34 @@ FIGURES: dict[str, Figure] = {
     ),
 }
 """The figures by name: the paper's in its order, then those of its section 1.2 and of noise."""
+
+
+def check(study: config.Study) -> None:
+    """Refuse a study that asks for figures that do not exist or lack their sweeps.
+
+    Parameters
+    ----------
+    study
+        The configuration.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If a figure is unknown, stands there twice, or shows a sweep that the study lacks.
+    """
+    faults = []
+    asked = study.outputs.figures
+    for number, name in enumerate(asked):
+        where = f"outputs.figures[{number}]"
+        if name not in FIGURES:
+            faults.append(validation.Fault(where, name, f"no such figure; {', '.join(FIGURES)}"))
+            continue
+        if name in asked[:number]:
+            faults.append(validation.Fault(where, name, "stands there twice"))
+        faults += [
+            validation.Fault(where, name, f"shows the sweep '{sweep}', which `sweeps` lacks")
+            for sweep in FIGURES[name].sweeps
+            if sweep not in study.sweeps
+        ]
+    if faults:
+        raise validation.ConfigurationError(faults)
