@@ -6,7 +6,8 @@ Checks that need radar physics are in `vinsar.validation`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from math import cos, radians, sin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
@@ -43,6 +44,91 @@ class Radar(Section):
     )
 
 
+class _Placed(Section):
+    """Something at a place of the scene."""
+
+    x_m: float = _key("position of its centre along the rail", "ours")
+    y_m: float = _key("position of its centre ahead", "ours")
+
+
+class _Rectangle(_Placed):
+    """A rectangle at a place of the scene."""
+
+    size_x_m: float = _key("extent along x, before its rotation", "ours", gt=0)
+    size_y_m: float = _key("extent along y, before its rotation", "ours", gt=0)
+    rotation_deg: float = _key(
+        "rotation from x towards y; 0 if left out", "ours", default=0.0, ge=-180, le=180
+    )
+
+    def reach(self) -> tuple[float, float]:
+        """Return how far it reaches from its centre along x and y, m."""
+        cosine, sine = (abs(part(radians(self.rotation_deg))) for part in (cos, sin))
+        half_x, half_y = self.size_x_m / 2, self.size_y_m / 2
+        return half_x * cosine + half_y * sine, half_x * sine + half_y * cosine
+
+
+class _Disc(_Placed):
+    """A disc at a place of the scene."""
+
+    diameter_m: float = _key("diameter on the ground", "ours", gt=0)
+
+    def reach(self) -> tuple[float, float]:
+        """Return how far it reaches from its centre along x and y, m."""
+        return self.diameter_m / 2, self.diameter_m / 2
+
+
+class _Object(_Placed):
+    """Something that rises above the ground or falls below it."""
+
+    reflectivity: float | None = _key(
+        "its reflectivity; that of the ground beneath if left out", "ours", default=None, ge=0
+    )
+
+
+class Box(_Object, _Rectangle):
+    """A box: upright walls, a top that follows the ground beneath."""
+
+    shape: Literal["box"] = _key("a box", "ours")
+    height_m: float = _key("height above the ground beneath", "ours", gt=0)
+
+
+class Stump(_Object, _Disc):
+    """An upright cylinder."""
+
+    shape: Literal["stump"] = _key("a stump", "ours")
+    height_m: float = _key("height above the ground beneath", "ours", gt=0)
+
+
+class Mound(_Object, _Disc):
+    """A mound: the cap of a sphere."""
+
+    shape: Literal["mound"] = _key("a mound", "ours")
+    height_m: float = _key("height of its top above the ground beneath", "ours", gt=0)
+
+
+class Ditch(_Object, _Rectangle):
+    """A trench with upright walls."""
+
+    shape: Literal["ditch"] = _key("a ditch", "ours")
+    depth_m: float = _key("depth below the ground around", "ours", gt=0)
+
+
+class Pit(_Object, _Disc):
+    """A round hole with an upright wall."""
+
+    shape: Literal["pit"] = _key("a pit", "ours")
+    depth_m: float = _key("depth below the ground around", "ours", gt=0)
+
+
+class Patch(_Rectangle):
+    """Ground of another reflectivity, without height."""
+
+    reflectivity: float = _key("its reflectivity", "section 1, without a figure", ge=0)
+
+
+SceneObject = Annotated[Box | Stump | Mound | Ditch | Pit, Field(discriminator="shape")]
+
+
 class Scene(Section):
     """The true terrain: for the simulated echo and the metrics, never for the processing."""
 
@@ -64,6 +150,18 @@ class Scene(Section):
     )
     reflectivity_offset: float = _key(
         "reflectivity is the height in metres plus this", "section 2", gt=0
+    )
+    roughness_std_m: float = _key(
+        "standard deviation of the random roughness of the ground; 0 for none", "ours", ge=0
+    )
+    roughness_correlation_m: float = _key(
+        "distance at which the roughness is correlated by 1/e", "ours", gt=0
+    )
+    objects: Annotated[tuple[SceneObject, ...], Field(strict=False)] = _key(
+        "obstacles and holes, added to the terrain", "sections 1 and 3, without a figure"
+    )
+    patches: Annotated[tuple[Patch, ...], Field(strict=False)] = _key(
+        "ground of another reflectivity, without height", "section 1, without a figure"
     )
 
 
@@ -371,6 +469,13 @@ class Study(Section):
                 plain = isinstance(value, Section)
                 result[name] = value.model_dump(mode="json") if plain else value
         return result
+
+
+def models_in(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models that an annotation names: those of a list's items, for example."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in models_in(part)]
 
 
 def swept_section(study: Study, sweep: str, section: str) -> Any:

@@ -46,7 +46,7 @@ logger = logging.getLogger(__name__)
 Products = dict[str, "xr.Dataset"]
 
 # What a random draw is for; the number is part of its seed and never changes.
-_JITTER, _NOISE, _MOTION, _BASELINE = 0, 1, 2, 3
+_JITTER, _NOISE, _MOTION, _BASELINE, _ROUGHNESS = 0, 1, 2, 3, 4
 
 # Slant range by which the profiles exceed the image: position errors shall not need new ones.
 _PROFILE_MARGIN_M = 0.5
@@ -141,7 +141,7 @@ def _recorded_trajectory(products: Products, study: config.Study) -> xr.Dataset:
 
 def _terrain(products: Products, study: config.Study) -> xr.Dataset:
     del products
-    return scene.terrain(
+    ground = scene.terrain(
         study.scene.terrain,
         x_min_m=study.scene.x_min_m,
         x_max_m=study.scene.x_max_m,
@@ -150,6 +150,14 @@ def _terrain(products: Products, study: config.Study) -> xr.Dataset:
         spacing_m=study.scene.terrain_spacing_m,
         peak_height_m=study.scene.peak_height_m,
         reflectivity_offset=study.scene.reflectivity_offset,
+    )
+    return scene.furnish(
+        ground,
+        objects=study.scene.objects,
+        patches=study.scene.patches,
+        roughness_std_m=study.scene.roughness_std_m,
+        roughness_correlation_m=study.scene.roughness_correlation_m,
+        rng=_rng(study, _ROUGHNESS),
     )
 
 
@@ -385,7 +393,7 @@ _GRID = (
 )
 
 STAGES: dict[str, Stage] = {
-    "terrain": Stage(_terrain, (), ("scene",), ("scene",)),
+    "terrain": Stage(_terrain, (), (*_DRAWS, "scene"), ("scene",)),
     "facets": Stage(
         _facets,
         ("terrain",),

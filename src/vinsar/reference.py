@@ -94,7 +94,7 @@ def _allowed(field: FieldInfo) -> str:
     options = typing.get_args(annotation)
     inner = _inner_models(annotation)
     if inner or _is_model(annotation):
-        name = inner[0].__name__ if inner else getattr(annotation, "__name__", "")
+        name = ", ".join(model.__name__ for model in inner) or getattr(annotation, "__name__", "")
         many: dict[Any, str] = {tuple: "list of ", dict: "by name: "}
         return many.get(typing.get_origin(annotation), "") + name
     if typing.get_origin(annotation) is dict:
@@ -120,7 +120,7 @@ def _is_model(annotation: Any) -> bool:
 
 def _inner_models(annotation: Any) -> list[type[BaseModel]]:
     """Return the models that a list or mapping holds."""
-    return [kind for kind in typing.get_args(annotation) if _is_model(kind)]
+    return [] if _is_model(annotation) else config.models_in(annotation)
 
 
 def schema() -> str:

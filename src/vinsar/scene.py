@@ -5,19 +5,27 @@ Only the simulated echo and the metrics may know it; the processing never does.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vinsar import geometry, variables
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from vinsar import config
+
+    Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
 
 TerrainName = Literal["peaks", "flat"]
+
+# Tangent of 60 degrees: from here on a face is a wall, its surface more than twice its ground.
+_WALL_SLOPE = 3**0.5
 
 
 def peaks(u: ArrayLike, v: ArrayLike) -> Floats:
@@ -107,6 +115,128 @@ def terrain(
     )
 
 
+def roughness(
+    x: Floats, y: Floats, *, std_m: float, correlation_m: float, rng: np.random.Generator
+) -> Floats:
+    """Return a random field with a Gaussian autocorrelation.
+
+    White noise under a Gaussian of the standard deviation ``s`` is correlated as
+    ``exp(-d^2 / 4 s^2)``: ``s`` is half the correlation length. The field is periodic.
+
+    Parameters
+    ----------
+    x, y
+        Axes of the raster, m.
+    std_m
+        Standard deviation of the field, not of its sample on this raster, m.
+    correlation_m
+        Distance at which the correlation has fallen to 1/e, m.
+    rng
+        Source of randomness.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Heights, m.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    sigma = [correlation_m / 2 / float(axis[1] - axis[0]) for axis in (y, x)]
+    impulse = np.zeros((y.size, x.size))
+    impulse[y.size // 2, x.size // 2] = 1
+    gain = np.sqrt((gaussian_filter(impulse, sigma, mode="wrap") ** 2).sum())
+    white = rng.normal(size=impulse.shape)
+    return np.asarray(std_m / gain * gaussian_filter(white, sigma, mode="wrap"))
+
+
+def _inside(part: Any, x: Floats, y: Floats) -> Flags:
+    """Return which points lie on a disc or on a turned rectangle, its edge included."""
+    slack = 1e-9
+    x, y = x - part.x_m, y - part.y_m
+    if hasattr(part, "diameter_m"):
+        return np.asarray(np.hypot(x, y) <= part.diameter_m / 2 + slack)
+    turn = np.deg2rad(part.rotation_deg)
+    across = np.abs(np.cos(turn) * x + np.sin(turn) * y)
+    along = np.abs(np.cos(turn) * y - np.sin(turn) * x)
+    return np.asarray((across <= part.size_x_m / 2 + slack) & (along <= part.size_y_m / 2 + slack))
+
+
+def relief(part: config.SceneObject, x: Floats, y: Floats) -> Floats:
+    """Return how far an object rises above the ground, or falls below it.
+
+    Parameters
+    ----------
+    part
+        The object.
+    x, y
+        Points, m, of shapes that broadcast.
+
+    Returns
+    -------
+    ndarray
+        Heights, m: positive for a box, stump or mound, negative for a ditch or pit, 0 beside it.
+    """
+    inside = _inside(part, x, y)
+    if part.shape == "mound":
+        edge, top = part.diameter_m / 2, part.height_m
+        radius = (edge**2 + top**2) / (2 * top)
+        away = np.hypot(x - part.x_m, y - part.y_m)
+        cap = np.sqrt(np.maximum(radius**2 - away**2, 0)) - (radius - top)
+        return np.where(inside, np.maximum(cap, 0), 0.0)
+    if part.shape == "ditch" or part.shape == "pit":
+        return np.where(inside, -part.depth_m, 0.0)
+    return np.where(inside, part.height_m, 0.0)
+
+
+def furnish(
+    terrain: xr.Dataset,
+    *,
+    objects: Sequence[config.SceneObject],
+    patches: Sequence[config.Patch],
+    roughness_std_m: float,
+    roughness_correlation_m: float,
+    rng: np.random.Generator,
+) -> xr.Dataset:
+    """Put roughness, patches and objects on a terrain.
+
+    Parameters
+    ----------
+    terrain
+        Product ``terrain``.
+    objects
+        Obstacles and holes; where they overlap, their heights add up.
+    patches
+        Ground of other reflectivity; a later one covers an earlier one, objects cover them all.
+    roughness_std_m, roughness_correlation_m
+        As in `roughness`; no roughness for a standard deviation of 0.
+    rng
+        Source of randomness of the roughness.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``terrain``. Upright walls are one cell of the raster thick.
+    """
+    x, y = terrain["x"].values, terrain["y"].values
+    height, reflectivity = terrain["height"].values.copy(), terrain["reflectivity"].values.copy()
+    if roughness_std_m > 0:
+        height += roughness(
+            x, y, std_m=roughness_std_m, correlation_m=roughness_correlation_m, rng=rng
+        )
+    # ASSUME: the reflectivity follows the height of the terrain alone, not that of its roughness
+    # and of the objects.
+    across, ahead = x[None, :], y[:, None]
+    for patch in patches:
+        reflectivity[_inside(patch, across, ahead)] = patch.reflectivity
+    for part in objects:
+        height += relief(part, across, ahead)
+        if part.reflectivity is not None:
+            reflectivity[_inside(part, across, ahead)] = part.reflectivity
+    return variables.dataset(
+        "terrain", {"height": height, "reflectivity": reflectivity}, {"x": x, "y": y}
+    )
+
+
 def sample(raster: xr.DataArray, x: ArrayLike, y: ArrayLike) -> Floats:
     """Return a raster's values at points, bilinearly interpolated.
 
@@ -139,6 +269,10 @@ def facets(
     component of the wave number is a multiple of ``2 pi / size`` all echoes add up. A jitter of one
     full cell makes that coherent sum zero on average.
 
+    Cells of the ground hold hardly a facet of an upright wall. On walls, faces steeper than 60
+    degrees, a facet therefore stands for surface, not for ground: further facets lie on them at
+    random, as many as their surface exceeds their ground by.
+
     Parameters
     ----------
     terrain
@@ -162,9 +296,12 @@ def facets(
     shift = facet_jitter * (rng.random((2, rows, columns)) - 0.5)
     facet_x = x[0] + width * (np.arange(columns)[None, :] + 0.5 + shift[0])
     facet_y = y[0] + depth * (np.arange(rows)[:, None] + 0.5 + shift[1])
+    wall_x, wall_y = _wall_facets(terrain, width * depth, rng)
+    facet_x = np.concatenate([facet_x.ravel(), wall_x])
+    facet_y = np.concatenate([facet_y.ravel(), wall_y])
     # The visibility kernel sweeps away from the antenna and wants the facets in that order.
-    order = np.argsort(facet_y, axis=None, kind="stable")
-    facet_x, facet_y = facet_x.ravel()[order], facet_y.ravel()[order]
+    order = np.argsort(facet_y, kind="stable")
+    facet_x, facet_y = facet_x[order], facet_y[order]
     facet_z = sample(terrain["height"], facet_x, facet_y)
     return variables.dataset(
         "facets",
@@ -173,3 +310,21 @@ def facets(
             "reflectivity": sample(terrain["reflectivity"], facet_x, facet_y),
         },
     )
+
+
+def _wall_facets(
+    terrain: xr.Dataset, area: float, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Return places of the facets that walls have beyond those of their ground."""
+    # ASSUME: a wall scatters as the ground does, by its surface and whatever the angle; the paper's
+    # terrain has no face as steep as that.
+    x, y, height = terrain["x"].values, terrain["y"].values, terrain["height"].values
+    step_x, step_y = x[1] - x[0], y[1] - y[0]
+    along_x, along_y = np.diff(height, axis=1) / step_x, np.diff(height, axis=0) / step_y
+    slope = np.hypot((along_x[1:] + along_x[:-1]) / 2, (along_y[:, 1:] + along_y[:, :-1]) / 2)
+    row, column = np.nonzero(slope > _WALL_SLOPE)
+    surplus = (np.sqrt(1 + slope[row, column] ** 2) - 1) * step_x * step_y / area
+    count = np.floor(surplus + rng.random(surplus.size)).astype(int)
+    row, column = np.repeat(row, count), np.repeat(column, count)
+    place = rng.random((2, row.size))
+    return x[0] + step_x * (column + place[0]), y[0] + step_y * (row + place[1])

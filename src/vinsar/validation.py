@@ -26,6 +26,13 @@ if TYPE_CHECKING:
     Rule = Callable[..., Iterator["Fault"]]
 
 
+_SHAPES = frozenset(
+    name
+    for model in config.models_in(config.SceneObject)
+    for name in typing.get_args(model.model_fields["shape"].annotation)
+)
+
+
 @dataclass(frozen=True)
 class Fault:
     """A key that is wrong.
@@ -253,6 +260,8 @@ def _apply(rules: Iterable[Rule], sections: Mapping[str, Any]) -> Iterator[Fault
 def _fault(error: Any) -> Fault:
     path = ""
     for part in error["loc"]:
+        if path.endswith("]") and part in _SHAPES:
+            continue  # pydantic's word for which of the shapes it is, not a key
         path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
     value = error["input"]
     if error["type"] == "missing":
@@ -294,10 +303,9 @@ def every_key() -> frozenset[str]:
 def _keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         yield prefix + name
-        # A key's own model, or that of the items of a list.
-        for kind in (field.annotation, *typing.get_args(field.annotation)):
-            if inspect.isclass(kind) and issubclass(kind, BaseModel):
-                yield from _keys(kind, f"{prefix}{name}.")
+        # A key's own model, or those of the items of a list.
+        for kind in config.models_in(field.annotation):
+            yield from _keys(kind, f"{prefix}{name}.")
 
 
 def _extent(section: str, part: Any) -> Iterator[Fault]:
@@ -364,6 +372,60 @@ def _scene_raster(scene: config.Scene) -> Iterator[Fault]:
             scene.reflectivity_offset,
             f"must be at least {least:.3f}, or the deepest hollow has a negative reflectivity",
         )
+
+
+def _furniture(scene: config.Scene) -> Iterator[Fault]:
+    """Check what stands on the terrain, in a scene whose raster may be wrong itself."""
+    least = 2 * scene.terrain_spacing_m
+    if scene.roughness_std_m > 0 and scene.roughness_correlation_m < least:
+        yield Fault(
+            "scene.roughness_correlation_m",
+            scene.roughness_correlation_m,
+            f"must be at least twice scene.terrain_spacing_m, {least:g} m, or the raster loses it",
+        )
+    parts: dict[str, config.SceneObject | config.Patch] = {}
+    parts |= {f"scene.objects[{number}]": part for number, part in enumerate(scene.objects)}
+    parts |= {f"scene.patches[{number}]": part for number, part in enumerate(scene.patches)}
+    for where, part in parts.items():
+        keys = [key for key in ("diameter_m", "size_x_m", "size_y_m") if hasattr(part, key)]
+        for key in keys:
+            if getattr(part, key) < least:
+                yield Fault(
+                    f"{where}.{key}",
+                    getattr(part, key),
+                    f"must be at least twice scene.terrain_spacing_m, {least:g} m, or the raster "
+                    "loses it",
+                )
+        for axis, reach in zip("xy", part.reach(), strict=True):
+            near, far = (getattr(part, f"{axis}_m") + sign * reach for sign in (-1, 1))
+            first, last = getattr(scene, f"{axis}_min_m"), getattr(scene, f"{axis}_max_m")
+            if near < first or far > last:
+                yield Fault(
+                    f"{where}.{axis}_m",
+                    getattr(part, f"{axis}_m"),
+                    f"it reaches from {near:.3g} to {far:.3g} m, but must lie in the scene, "
+                    f"{axis} {first:g} to {last:g} m",
+                )
+        if isinstance(part, config.Mound) and part.height_m > part.diameter_m / 2:
+            yield Fault(
+                f"{where}.height_m",
+                part.height_m,
+                f"must be at most half the diameter, {part.diameter_m / 2:g} m: a mound is the cap "
+                "of a sphere",
+            )
+
+
+def _object_heights(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    for number, part in enumerate(scene.objects):
+        for key in ("height_m", "depth_m"):
+            value = getattr(part, key, 0.0)
+            if value >= radar.rail_height_m:
+                yield Fault(
+                    f"scene.objects[{number}].{key}",
+                    value,
+                    f"must be below radar.rail_height_m, {radar.rail_height_m:g} m: what "
+                    "is as high hides all behind it",
+                )
 
 
 def _image_grid(imaging: config.Imaging) -> Iterator[Fault]:
@@ -637,6 +699,7 @@ def _image_in_scene(scene: config.Scene, imaging: config.Imaging) -> Iterator[Fa
 _WITHIN_SECTIONS: tuple[Rule, ...] = (
     _waveform,
     _scene_raster,
+    _furniture,
     _image_grid,
     _goldstein_step,
     _heights_rise,
@@ -646,6 +709,7 @@ _WITHIN_SECTIONS: tuple[Rule, ...] = (
 _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _odd_windows,
     _reference_in_image,
+    _object_heights,
     _unambiguous,
     _facets_fine,
     _grid_fine,

@@ -7,8 +7,9 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
-from vinsar import scene
+from vinsar import config, scene
 
 
 def make(name="peaks", **changes):
@@ -176,3 +177,125 @@ def test_jitter_in_x_and_y_is_independent():
 def test_facets_larger_than_the_terrain_are_one_facet():
     facets = cut(make("flat", spacing_m=0.5), 0.0, size=50.0)
     np.testing.assert_allclose(facets["facet_position"].values, [[0, 13, 0]], atol=1e-12)
+
+
+OBJECT = TypeAdapter(config.SceneObject)
+FLAT = {"roughness_std_m": 0.0, "roughness_correlation_m": 0.2, "objects": (), "patches": ()}
+
+
+def furnish(terrain, seed=3, **changes):
+    return scene.furnish(terrain, rng=np.random.default_rng(seed), **(FLAT | changes))
+
+
+def test_nothing_added_leaves_the_terrain_as_it_is(peaks):
+    assert furnish(peaks).identical(peaks)
+
+
+@pytest.mark.parametrize(
+    ("shape", "inside", "outside", "volume"),
+    [
+        # Volumes by the textbook: a b h, pi r^2 h, and pi h (3 r^2 + h^2) / 6 for the cap.
+        (
+            {"shape": "box", "size_x_m": 0.6, "size_y_m": 0.2, "rotation_deg": 30, "height_m": 0.3},
+            # Along the long side, 30 deg from x towards y.
+            (0.28 * np.cos(np.pi / 6), 0.28 * np.sin(np.pi / 6), 0.3),
+            (0.28 * np.cos(np.pi / 6), -0.28 * np.sin(np.pi / 6)),
+            0.6 * 0.2 * 0.3,
+        ),
+        (
+            {"shape": "stump", "diameter_m": 0.5, "height_m": 0.2},
+            (0.17, 0.17, 0.2),
+            (0.19, 0.19),
+            np.pi * 0.25**2 * 0.2,
+        ),
+        (
+            {"shape": "mound", "diameter_m": 0.8, "height_m": 0.2},
+            # The sphere through edge and top has the radius (0.4^2 + 0.2^2) / 0.4 = 0.5 m.
+            (0.3, 0.0, 0.4 - 0.3),
+            (0.3, 0.3),
+            np.pi * 0.2 * (3 * 0.4**2 + 0.2**2) / 6,
+        ),
+        (
+            {"shape": "ditch", "size_x_m": 0.8, "size_y_m": 0.3, "depth_m": 0.4},
+            (0.39, -0.14, -0.4),
+            (0.39, -0.17),
+            -0.8 * 0.3 * 0.4,
+        ),
+        (
+            {"shape": "pit", "diameter_m": 0.5, "depth_m": 0.6},
+            (-0.17, 0.17, -0.6),
+            (-0.19, 0.19),
+            -np.pi * 0.25**2 * 0.6,
+        ),
+    ],
+)
+def test_shapes_have_their_heights_and_volumes(shape, inside, outside, volume):
+    made = OBJECT.validate_python({"x_m": 1.0, "y_m": 12.0} | shape)
+    x, y, height = inside
+    assert scene.relief(made, np.array(1.0 + x), np.array(12.0 + y)) == pytest.approx(height)
+    assert scene.relief(made, np.array(1.0 + outside[0]), np.array(12.0 + outside[1])) == 0
+    axis = (np.arange(-500, 500) + 0.5) * 1e-3
+    raster = scene.relief(made, 1.0 + axis[None, :], 12.0 + axis[:, None])
+    # Midpoints 1 mm apart: the rim's cells err at random, by 1e-3 of the volume at most.
+    assert raster.sum() * 1e-6 == pytest.approx(volume, rel=2e-3)
+
+
+def test_objects_stand_on_the_terrain_and_add_up(peaks):
+    box = {"shape": "box", "x_m": 0, "y_m": 12, "size_x_m": 1, "size_y_m": 1, "height_m": 0.3}
+    pit = {"shape": "pit", "x_m": 0, "y_m": 12, "diameter_m": 0.2, "depth_m": 0.1}
+    objects = [OBJECT.validate_python(one) for one in (box, pit)]
+    added = (furnish(peaks, objects=objects) - peaks)["height"]
+    assert added.sel(x=0, y=12, method="nearest") == pytest.approx(0.2)
+    assert added.sel(x=0.4, y=12.4, method="nearest") == pytest.approx(0.3)
+    assert added.sel(x=0.6, y=12, method="nearest") == 0
+
+
+def test_reflectivity_is_that_of_patches_and_objects_and_has_no_height():
+    terrain = make("flat")
+    place = {"x_m": 0, "y_m": 12, "size_x_m": 1, "size_y_m": 1}
+    patch = config.Patch.model_validate(place | {"reflectivity": 2.0})
+    pit = {"shape": "pit", "x_m": 0, "y_m": 12, "diameter_m": 0.4, "depth_m": 0.6}
+    plain, bright = (OBJECT.validate_python(pit | extra) for extra in ({}, {"reflectivity": 3.0}))
+    found = furnish(terrain, patches=[patch])
+    assert found["height"].identical(terrain["height"])
+    assert found["reflectivity"].sel(x=0.4, y=12.4, method="nearest") == 2
+    assert found["reflectivity"].sel(x=0.6, y=12, method="nearest") == 0.5
+    # An object without a reflectivity has that of the ground, whatever its depth.
+    for one, expected in ((plain, 2.0), (bright, 3.0)):
+        found = furnish(terrain, patches=[patch], objects=[one])["reflectivity"]
+        assert found.sel(x=0, y=12, method="nearest") == expected
+
+
+def test_roughness_has_its_spread_and_its_correlation():
+    terrain = make("flat", spacing_m=0.02)
+    std, length = 0.02, 0.1
+    height = furnish(terrain, roughness_std_m=std, roughness_correlation_m=length)["height"].values
+    # The field has some 5 * 6 / (2 pi (l / 2)^2) = 1900 independent cells, so that its standard
+    # deviation is known to 1 / sqrt(2 * 1900) = 1.6 %; three times that.
+    assert height.std() == pytest.approx(std, rel=0.05)
+    for lag in (2, 5, 8):
+        expected = np.exp(-((lag * 0.02 / length) ** 2))
+        for pair in ((height[lag:], height[:-lag]), (height[:, lag:], height[:, :-lag])):
+            assert (pair[0] * pair[1]).mean() / std**2 == pytest.approx(expected, abs=0.07)
+    assert np.array_equal(
+        height, furnish(terrain, roughness_std_m=std, roughness_correlation_m=length)["height"]
+    )
+
+
+def test_walls_have_facets_by_their_surface_and_gentle_ground_by_its_area(peaks):
+    box = {"shape": "box", "x_m": 0, "y_m": 12, "size_x_m": 1, "size_y_m": 0.6, "height_m": 0.3}
+    terrain = furnish(make("flat", spacing_m=0.01), objects=[OBJECT.validate_python(box)])
+    position = cut(terrain, 1.0)["facet_position"].values
+    x, y, z = position.T
+    wall = (z > 0.02) & (z < 0.28)
+    # Four walls, one raster cell thick: perimeter times height over the area of a facet, known to
+    # the root of the count.
+    expected = 2 * (1 + 0.6) * 0.26 / 0.03**2
+    assert wall.sum() == pytest.approx(expected, abs=4 * np.sqrt(expected))
+    # The wall that faces the radar has its share, evenly from bottom to top.
+    facing = z[wall & (np.abs(y - 11.7) < 0.011) & (np.abs(x) < 0.5)]
+    expected = 0.26 / 0.03**2
+    assert facing.size == pytest.approx(expected, abs=4 * np.sqrt(expected))
+    assert facing.mean() == pytest.approx(0.15, abs=4 * 0.26 / np.sqrt(12 * facing.size))
+    # Nothing of the peaks is a wall: one facet a cell.
+    assert cut(peaks, 1.0).sizes["facet"] == 167 * 200

@@ -8,6 +8,10 @@ from vinsar import validation
 
 CONFIG = Path(__file__).parents[2] / "config"
 PAPER = yaml.safe_load((CONFIG / "paper.yaml").read_text())
+BOX = {"shape": "box", "x_m": 0.0, "y_m": 12.0, "size_x_m": 0.5, "size_y_m": 0.5, "height_m": 0.3}
+PIT = {"shape": "pit", "x_m": 0.0, "y_m": 12.0, "diameter_m": 0.5, "depth_m": 0.3}
+MOUND = {"shape": "mound", "x_m": 0.0, "y_m": 12.0, "diameter_m": 0.5, "height_m": 0.2}
+PATCH = {"x_m": 0.0, "y_m": 12.0, "size_x_m": 0.5, "size_y_m": 0.5, "reflectivity": 1.0}
 RECTANGLE = {"x_min_m": -1.0, "x_max_m": 1.0, "y_min_m": 10.5, "y_max_m": 11.0}
 
 
@@ -56,6 +60,44 @@ def test_the_paper_is_wise():
         ({"scene__reflectivity_offset": 0.1}, "scene.reflectivity_offset", "at least 0.24"),
         ({"imaging__grid_spacing_m": 0.021}, "imaging.grid_spacing_m", "must divide"),
         ({"scene__y_min_m": -5.0}, "scene.y_min_m", "look ahead"),
+        ({"scene__objects": [BOX | {"shape": "bx"}]}, "scene.objects[0]", "'box', 'stump'"),
+        ({"scene__objects": [BOX | {"hight_m": 1.0}]}, "scene.objects[0].hight_m", "height_m"),
+        (
+            {"scene__objects": [PIT, BOX | {"height_m": -0.1}]},
+            "scene.objects[1].height_m",
+            "greater than 0",
+        ),
+        (
+            {"scene__objects": [BOX | {"reflectivity": -0.1}]},
+            "scene.objects[0].reflectivity",
+            "greater than or equal to 0",
+        ),
+        # A quarter of its diagonal wider when it is turned by 45 degrees.
+        (
+            {"scene__objects": [BOX | {"x_m": 2.2, "rotation_deg": 45.0}]},
+            "scene.objects[0].x_m",
+            "from 1.85 to 2.55 m, but must lie in the scene, x -2.5 to 2.5 m",
+        ),
+        (
+            {"scene__objects": [PIT | {"y_m": 15.9}]},
+            "scene.objects[0].y_m",
+            "from 15.7 to 16.1 m, but must lie in the scene, y 10 to 16 m",
+        ),
+        ({"scene__objects": [PIT | {"depth_m": 2.0}]}, "scene.objects[0].depth_m", "below radar"),
+        ({"scene__objects": [BOX | {"height_m": 2.0}]}, "scene.objects[0].height_m", "below radar"),
+        ({"scene__objects": [MOUND | {"height_m": 0.3}]}, "scene.objects[0].height_m", "0.25 m"),
+        ({"scene__objects": [PIT | {"diameter_m": 0.01}]}, "scene.objects[0].diameter_m", "0.02 m"),
+        ({"scene__patches": [PATCH | {"size_x_m": 6.0}]}, "scene.patches[0].x_m", "in the scene"),
+        (
+            {"scene__patches": [PATCH | {"reflectivity": -1.0}]},
+            "scene.patches[0].reflectivity",
+            "greater than or equal to 0",
+        ),
+        (
+            {"scene__roughness_std_m": 0.01, "scene__roughness_correlation_m": 0.01},
+            "scene.roughness_correlation_m",
+            "at least twice scene.terrain_spacing_m, 0.02 m",
+        ),
         ({"radar__frequency_count": 101}, "scene.y_max_m", "unambiguous range, 7.49 m"),
         ({"scene__facet_size_m": 0.05}, "scene.facet_size_m", "half a resolution cell"),
         ({"radar__position_spacing_m": 0.04}, "radar.position_spacing_m", "ambiguously"),
