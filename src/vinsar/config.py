@@ -182,6 +182,25 @@ class Echo(Section):
         ge=-40,
         le=120,
     )
+    coupling_db: float | None = _key(
+        "power of the coupling between transmitter and receiver over the mean power of the scene, "
+        "both in a range-compressed resolution cell; null for none",
+        "future work",
+        ge=-40,
+        le=140,
+    )
+    coupling_path_m: float = _key(
+        "path of the coupling inside the radar; the distance between the antennas comes to it",
+        "not given",
+        ge=0,
+    )
+    coupling_variation_db: float | None = _key(
+        "what of the coupling changes at random from position to position, over the coupling; "
+        "null for none",
+        "not given",
+        ge=-140,
+        le=0,
+    )
     accuracy_db: float = _key(
         "largest error of the fast sum against the direct one; from -85 on, many times as fast",
         "not given",
@@ -214,6 +233,17 @@ class Motion(Section):
         "undisturbed ones",
         "section 2.4 has measurement errors",
     )
+
+
+class Suppression(Section):
+    """Suppression of the coupling between transmitter and receiver."""
+
+    method: Literal["none", "gate", "common", "both"] = _key(
+        "what is removed from the echo: returns from within the gate, what is common to all "
+        "antenna positions, or both",
+        "future work",
+    )
+    gate_range_m: float = _key("slant range up to which the gate removes returns", "ours", gt=0)
 
 
 class Imaging(Section):
@@ -399,6 +429,7 @@ class Study(Section):
     scene: Scene
     echo: Echo
     motion: Motion
+    suppression: Suppression
     imaging: Imaging
     interferogram: Interferogram
     filtering: Filtering

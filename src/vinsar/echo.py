@@ -311,16 +311,85 @@ def add_noise(
     """
     samples = echo["echo"].values
     frequency = echo["frequency"].values
-    unambiguous = radar.unambiguous_range(float(frequency[1] - frequency[0]))
-    if not 0 < swath_m <= unambiguous:
-        raise ValueError(
-            f"a swath of {swath_m:.2f} m is not within the unambiguous range of {unambiguous:.2f} m"
-        )
     if len(rngs) != samples.shape[0]:
         raise ValueError(f"{samples.shape[0]} channels need as many sources, not {len(rngs)}")
-    power = np.mean(np.abs(samples) ** 2) * unambiguous / swath_m / 10 ** (snr_db / 10)
+    power = _filled(samples, frequency, swath_m) / 10 ** (snr_db / 10)
     noise = np.stack(
         [rng.normal(size=(*samples.shape[1:], 2)).view(np.complex128)[..., 0] for rng in rngs]
     )
     coords = {"channel": echo["channel"].values, "frequency": frequency}
     return variables.dataset("echo", {"echo": samples + np.sqrt(power / 2) * noise}, coords)
+
+
+def add_coupling(
+    received: xr.Dataset,
+    echo: xr.Dataset,
+    trajectory: xr.Dataset,
+    *,
+    coupling_db: float,
+    path_m: float,
+    variation_db: float | None,
+    swath_m: float,
+    rngs: list[np.random.Generator],
+) -> xr.Dataset:
+    """Add the coupling between transmitter and receiver: a return at near zero range.
+
+    Its path is that inside the radar and the distance from transmitter to receiver. At each
+    position it has one complex amplitude for all frequencies, ``1 + e`` times its level, with a
+    circular normal ``e`` that is drawn anew at every position.
+
+    Parameters
+    ----------
+    received, echo
+        Product ``echo`` with and without noise.
+    trajectory
+        Product ``true_trajectory``.
+    coupling_db
+        Power of the coupling over the mean power of the scene, both in a range-compressed
+        resolution cell with uniform weighting, dB.
+    path_m
+        Path inside the radar, m.
+    variation_db
+        Mean power of ``e``, dB; None for a constant coupling.
+    swath_m
+        Extent of the scene in slant range, m.
+    rngs
+        One source of randomness a channel.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``received`` with coupling.
+
+    Raises
+    ------
+    ValueError
+        If the swath is not within the unambiguous range, or a source is missing.
+    """
+    samples, frequency = received["echo"].values, received["frequency"].values
+    channels, positions, count = samples.shape
+    if len(rngs) != channels:
+        raise ValueError(f"{channels} channels need as many sources, not {len(rngs)}")
+    # The scene's cells are `count` to the unambiguous range; the coupling is all in one of them.
+    cell = _filled(echo["echo"].values, frequency, swath_m) / count
+    amplitude = np.full((channels, positions), np.sqrt(cell * 10 ** (coupling_db / 10)), complex)
+    if variation_db is not None:
+        draws = np.stack([rng.normal(size=(positions, 2)) @ [1, 1j] for rng in rngs])
+        amplitude *= 1 + np.sqrt(10 ** (variation_db / 10) / 2) * draws
+    apart = trajectory["transmitter"].values - trajectory["receiver"].values
+    path = path_m + np.linalg.norm(apart, axis=-1)
+    phase = np.exp(-2j * np.pi * path[..., None] * frequency / SPEED_OF_LIGHT)
+    coords = {"channel": received["channel"].values, "frequency": frequency}
+    return variables.dataset("echo", {"echo": samples + amplitude[..., None] * phase}, coords)
+
+
+def _filled(
+    samples: NDArray[np.complexfloating], frequency: NDArray[np.floating], swath_m: float
+) -> float:
+    """Return the mean power of a sample, were all ranges as strong as the swath."""
+    unambiguous = radar.unambiguous_range(float(frequency[1] - frequency[0]))
+    if not 0 < swath_m <= unambiguous:
+        raise ValueError(
+            f"a swath of {swath_m:.2f} m is not within the unambiguous range of {unambiguous:.2f} m"
+        )
+    return float(np.mean(np.abs(samples) ** 2) * unambiguous / swath_m)

@@ -27,6 +27,7 @@ from vinsar import (
     radar,
     registration,
     scene,
+    suppression,
     trajectory,
     unwrapping,
     variables,
@@ -46,7 +47,7 @@ logger = logging.getLogger(__name__)
 Products = dict[str, "xr.Dataset"]
 
 # What a random draw is for; the number is part of its seed and never changes.
-_JITTER, _NOISE, _MOTION, _BASELINE, _ROUGHNESS = 0, 1, 2, 3, 4
+_JITTER, _NOISE, _MOTION, _BASELINE, _ROUGHNESS, _COUPLING = 0, 1, 2, 3, 4, 5
 
 # Slant range by which the profiles exceed the image: position errors shall not need new ones.
 _PROFILE_MARGIN_M = 0.5
@@ -195,20 +196,32 @@ def _echo(products: Products, study: config.Study) -> xr.Dataset:
 
 
 def _received(products: Products, study: config.Study) -> xr.Dataset:
-    if study.echo.snr_db is None:
-        return products["echo"]
-    facets = products["facets"]
+    clean, options = products["echo"], study.echo
+    if options.snr_db is None and options.coupling_db is None:
+        return clean
+    facets, antennas = products["facets"], products["true_trajectory"]
     near, far = trajectory.range_extent(
-        products["true_trajectory"],
-        *_facet_extent(facets),
-        facets["facet_position"].values[:, 2],
+        antennas, *_facet_extent(facets), facets["facet_position"].values[:, 2]
     )
-    return echo.add_noise(
-        products["echo"],
-        snr_db=study.echo.snr_db,
-        swath_m=far - near,
-        rngs=[_rng(study, _NOISE, channel) for channel in range(products["echo"].sizes["channel"])],
-    )
+
+    def rngs(purpose: int) -> list[np.random.Generator]:
+        return [_rng(study, purpose, channel) for channel in range(clean.sizes["channel"])]
+
+    result = clean
+    if options.snr_db is not None:
+        result = echo.add_noise(clean, snr_db=options.snr_db, swath_m=far - near, rngs=rngs(_NOISE))
+    if options.coupling_db is not None:
+        result = echo.add_coupling(
+            result,
+            clean,
+            antennas,
+            coupling_db=options.coupling_db,
+            path_m=options.coupling_path_m,
+            variation_db=options.coupling_variation_db,
+            swath_m=far - near,
+            rngs=rngs(_COUPLING),
+        )
+    return result
 
 
 def _facet_extent(facets: xr.Dataset) -> tuple[Floats, Floats]:
@@ -220,7 +233,7 @@ def _facet_extent(facets: xr.Dataset) -> tuple[Floats, Floats]:
 def _profiles(products: Products, study: config.Study) -> xr.Dataset:
     near, far = trajectory.range_extent(products["trajectory"], *image_axes(study.imaging))
     return imaging.compress(
-        products["received"],
+        suppression.suppress(products["received"], **study.suppression.model_dump()),
         near_range_m=max(0.0, near - _PROFILE_MARGIN_M),
         far_range_m=far + _PROFILE_MARGIN_M,
         window=study.imaging.range_window,
@@ -428,14 +441,26 @@ STAGES: dict[str, Stage] = {
     "received": Stage(
         _received,
         ("echo", "facets", "true_trajectory"),
-        (*_DRAWS, "echo.snr_db"),
+        (
+            *_DRAWS,
+            "echo.snr_db",
+            "echo.coupling_db",
+            "echo.coupling_path_m",
+            "echo.coupling_variation_db",
+        ),
         ("echo", "trajectory"),
     ),
     "profiles": Stage(
         _profiles,
         ("received", "trajectory"),
-        (*_GRID, "imaging.range_window", "imaging.oversampling", "imaging.interpolation"),
-        ("imaging", "trajectory"),
+        (
+            *_GRID,
+            "suppression",
+            "imaging.range_window",
+            "imaging.oversampling",
+            "imaging.interpolation",
+        ),
+        ("suppression", "imaging", "trajectory"),
     ),
     "recorded_trajectory": Stage(
         _recorded_trajectory, ("trajectory",), (*_DRAWS, *_WAVEFORM, "motion"), ("motion", "radar")

@@ -628,6 +628,26 @@ def _positions_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault
         )
 
 
+def _gate_before_image(
+    radar: config.Radar, suppression: config.Suppression, imaging: config.Imaging
+) -> Iterator[Fault]:
+    if suppression.method not in ("gate", "both"):
+        return
+    derived = _Derived.of(radar)
+    lateral = max(abs(imaging.x_min_m), abs(imaging.x_max_m)) + radar.aperture_length_m / 2
+    far = float(np.linalg.norm([lateral, imaging.y_max_m, derived.upper[2]]))
+    near = float(np.hypot(imaging.y_min_m - derived.upper[1], derived.lower[2]))
+    # Ranges repeat: the gate lies beyond the image as well.
+    most = min(near / 2, derived.unambiguous_range - far)
+    if suppression.gate_range_m > most:
+        yield Fault(
+            "suppression.gate_range_m",
+            suppression.gate_range_m,
+            f"must be at most {most:.2f} m: half the slant range of the image's near edge, and "
+            "what the unambiguous range leaves beyond its far edge",
+        )
+
+
 def _targets_imaged(radar: config.Radar, registration: config.Registration) -> Iterator[Fault]:
     derived = _Derived.of(radar)
     foremost = max(0.0, float(derived.upper[1]))
@@ -683,6 +703,20 @@ def _facets_coarse(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
         )
 
 
+def _coupling_in_gate(echo: config.Echo, suppression: config.Suppression) -> Iterator[Fault]:
+    gated = suppression.method in ("gate", "both")
+    if (
+        echo.coupling_db is not None
+        and gated
+        and echo.coupling_path_m > 2 * suppression.gate_range_m
+    ):
+        yield Fault(
+            "suppression.gate_range_m",
+            suppression.gate_range_m,
+            f"the coupling comes from beyond it, {echo.coupling_path_m / 2:g} m, and stays",
+        )
+
+
 def _image_in_scene(scene: config.Scene, imaging: config.Imaging) -> Iterator[Fault]:
     outside = (
         imaging.x_min_m < scene.x_min_m
@@ -714,6 +748,7 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _facets_fine,
     _grid_fine,
     _positions_dense,
+    _gate_before_image,
     _targets_imaged,
 )
-_UNWISE: tuple[Rule, ...] = (_baseline_short, _facets_coarse, _image_in_scene)
+_UNWISE: tuple[Rule, ...] = (_baseline_short, _facets_coarse, _coupling_in_gate, _image_in_scene)

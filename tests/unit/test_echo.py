@@ -222,3 +222,59 @@ def test_a_swath_beyond_the_unambiguous_range_is_refused(speckle):
 def test_each_channel_needs_its_source_of_noise(speckle):
     with pytest.raises(ValueError, match="2 channels need as many sources, not 1"):
         echo.add_noise(speckle, snr_db=10.0, swath_m=SWATH, rngs=[np.random.default_rng(0)])
+
+
+def coupled(received, antennas, seeds=(1, 2), **options):
+    options = {"coupling_db": 60.0, "path_m": 0.45, "variation_db": None} | options
+    return echo.add_coupling(
+        received, received, antennas, swath_m=SWATH,
+        rngs=[np.random.default_rng(seed) for seed in seeds], **options,
+    )["echo"].values - received["echo"].values  # fmt: skip
+
+
+def as_many(antennas, data):
+    return antennas.isel(position=np.arange(data.sizes["position"]) % antennas.sizes["position"])
+
+
+@pytest.mark.parametrize("coupling_db", [0.0, 60.0])
+def test_the_coupling_peaks_as_far_above_the_scene_s_cells_as_asked(speckle, rail, coupling_db):
+    found = coupled(speckle, as_many(rail, speckle), coupling_db=coupling_db, path_m=0.0)
+    count = found.shape[-1]
+    peak = np.abs(np.fft.ifft(found, axis=-1))[..., 0] ** 2
+    clean = np.abs(np.fft.ifft(speckle["echo"].values, axis=-1)) ** 2
+    slant = np.arange(count) * radar.unambiguous_range(1e7) / count
+    inside = (slant >= 10.0) & (slant < 10.0 + SWATH)
+    # Sidelobes beyond the swath's edges take some hundredths of a dB of the scene.
+    assert 10 * np.log10(peak.mean() / clean[..., inside].mean()) == pytest.approx(
+        coupling_db, abs=0.2
+    )
+
+
+def test_the_coupling_is_at_half_its_path_and_the_distance_between_the_antennas(
+    speckle, rail, bistatic
+):
+    frequency = speckle["frequency"].values
+    apart = np.linalg.norm([0.3, -0.1, 0.2])
+    for antennas, path in ((rail, 0.45), (bistatic, 0.45 + apart)):
+        found = coupled(speckle, as_many(antennas, speckle))
+        turn = found * np.exp(2j * np.pi * frequency * path / LIGHT)
+        np.testing.assert_allclose(turn, np.broadcast_to(turn[:1, :1, :1], turn.shape), rtol=1e-6)
+        assert turn[0, 0, 0].real > 0
+
+
+def test_the_coupling_varies_between_positions_and_not_over_the_frequencies(speckle, rail):
+    options = {"path_m": 0.0, "coupling_db": 20.0}
+    constant = coupled(speckle, as_many(rail, speckle), **options)
+    varied = coupled(speckle, as_many(rail, speckle), variation_db=-30.0, **options)
+    relative = varied / constant - 1
+    np.testing.assert_allclose(
+        relative, relative[..., :1].repeat(relative.shape[-1], -1), rtol=1e-3
+    )
+    draws = relative[..., 0].ravel()
+    # Mean power of n circular normal draws, to four standard deviations: 4 / sqrt(n).
+    assert np.mean(np.abs(draws) ** 2) == pytest.approx(1e-3, rel=4 / np.sqrt(draws.size))
+
+
+def test_each_channel_needs_its_source_of_coupling(speckle, rail):
+    with pytest.raises(ValueError, match="2 channels need as many sources, not 1"):
+        coupled(speckle, as_many(rail, speckle), seeds=(1,))

@@ -207,3 +207,26 @@ def test_a_variant_is_the_study_but_for_its_changes():
     assert low.radar == study.radar.model_copy(update={"rail_height_m": 1.8})
     assert low.scene == study.scene
     assert low.variants == {}
+
+
+def test_a_gate_into_the_scene_is_refused():
+    for method in ("gate", "both"):
+        found = faults(changed(suppression={"method": method, "gate_range_m": 6.0}))
+        assert found == {
+            "suppression.gate_range_m": "must be at most 5.10 m: half the slant range of the "
+            "image's near edge, and what the unambiguous range leaves beyond its far edge"
+        }
+    validation.check(changed(suppression={"method": "common", "gate_range_m": 6.0}))
+    # 241 frequencies repeat after 17.99 m; the far edge is at up to 16.42 m.
+    raw = changed(radar__frequency_count=241, suppression={"method": "gate", "gate_range_m": 1.6})
+    assert "at most 1.57 m" in faults(raw)["suppression.gate_range_m"]
+
+
+def test_a_coupling_from_beyond_the_gate_is_unwise():
+    raw = changed(
+        echo__coupling_db=60.0,
+        echo__coupling_path_m=2.4,
+        suppression={"method": "gate", "gate_range_m": 1.0},
+    )
+    assert ["the coupling comes from beyond it, 1.2 m" in found for found in
+            validation.advice(validation.check(raw))] == [True]  # fmt: skip
