@@ -32,6 +32,8 @@ def write_record(
     started: float,
     seconds: float,
     rule: str,
+    job: str,
+    threads: int,
     inputs: Mapping[str, str | Path],
 ) -> None:
     """Write the record of a finished result.
@@ -48,6 +50,10 @@ def write_record(
         When its job began (seconds since 1970) and how long it took.
     rule
         The rule that made it.
+    job
+        The rule's job: all results that were made together have it, and no others.
+    threads
+        On how many cores.
     inputs
         The results that it was made from, by name.
     """
@@ -58,10 +64,13 @@ def write_record(
         "sha256": provenance.sha256(path),
         "bytes": path.stat().st_size,
         "rule": rule,
+        "job": job,
+        "threads": threads,
         "inputs": {
             name: Path(source).relative_to(folder).as_posix() for name, source in inputs.items()
         },
-        "started": datetime.fromtimestamp(started, UTC).isoformat(timespec="seconds"),
+        "started": _instant(started),
+        "ended": _instant(started + seconds),
         "seconds": round(seconds, 3),
         "host": platform.node(),
         "platform": platform.platform(),
@@ -71,6 +80,10 @@ def write_record(
     target = folder / RECORDS / relative.with_name(relative.name + ".json")
     with storage.atomic(target) as temporary:
         temporary.write_text(json.dumps(record, indent=2, sort_keys=True) + "\n")
+
+
+def _instant(seconds: float) -> str:
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")
 
 
 def read_records(folder: str | Path) -> dict[str, dict[str, Any]]:
@@ -394,34 +407,67 @@ def compare(first: str | Path, second: str | Path) -> list[str]:
     for title in ("configuration", "code", "library", "accuracy"):
         one, two = (side[title] for side in sides)
         for key in sorted(set(one) | set(two)):
-            a, b = one.get(key, "absent"), two.get(key, "absent")
-            if a == b:
-                continue
-            if title == "code":
-                lines.append(f"code {key} differs")
-            elif isinstance(a, float) and isinstance(b, float):
-                lines.append(f"{title} {key}: {a:.6g} and {b:.6g}, {b - a:+.3g}")
-            else:
-                lines.append(f"{title} {key}: {a} and {b}")
+            for stages, a, b in _pairs(one.get(key, {}), two.get(key, {})):
+                # Each sweep has its own definition under the same key.
+                every = len(stages) == len(set(one.get(key, {})) & set(two.get(key, {})))
+                named = not stages or (every and not key.startswith("sweep."))
+                label = f"{title} {key}" if named else f"{title} {key} ({', '.join(stages)})"
+                if title == "code":
+                    lines.append(f"{label} differs")
+                elif isinstance(a, float) and isinstance(b, float):
+                    lines.append(f"{label}: {a:.6g} and {b:.6g}, {b - a:+.3g}")
+                else:
+                    lines.append(f"{label}: {a} and {b}")
     return lines
 
 
-def _summary(folder: str | Path) -> dict[str, dict[str, Any]]:
+def _pairs(one: Mapping[str, Any], two: Mapping[str, Any]) -> list[tuple[list[str], Any, Any]]:
+    """Return what differs between a key's values by stage: the stages, and both values."""
+    common = sorted(set(one) & set(two))
+    if not common:
+        a, b = (_all_of(values) for values in (one, two))
+        return [([], a, b)] if a != b else []
+    found: list[tuple[list[str], Any, Any]] = []
+    for stage in common:
+        a, b = one[stage], two[stage]
+        if a == b:
+            continue
+        for stages, *values in found:
+            if values == [a, b]:
+                stages.append(stage)
+                break
+        else:
+            found.append(([stage], a, b))
+    return found
+
+
+def _all_of(values: Mapping[str, Any]) -> Any:
+    distinct: list[Any] = []
+    for value in values.values():
+        if value not in distinct:
+            distinct.append(value)
+    return distinct[0] if len(distinct) == 1 else " or ".join(map(str, distinct)) or "absent"
+
+
+def _summary(folder: str | Path) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return, by kind and key, what each stage was made with: stages may disagree if one is old."""
     folder = Path(folder)
-    result: dict[str, dict[str, Any]] = {
+    result: dict[str, dict[str, dict[str, Any]]] = {
         "configuration": {}, "code": {}, "library": {}, "accuracy": {},
     }  # fmt: skip
     for record in read_records(folder).values():
         attributes = record["provenance"]
-        stage = attributes["vinsar_stage"]
-        for key, value in _leaves(json.loads(attributes["vinsar_configuration"])):
-            named = f"{stage}: {key}" if key.startswith("sweep") else key
-            result["configuration"][named] = value
-        result["code"] |= json.loads(attributes["vinsar_code"])
-        result["library"] |= json.loads(attributes["vinsar_libraries"])
+        for title, values in (
+            ("configuration", dict(_leaves(json.loads(attributes["vinsar_configuration"])))),
+            ("code", json.loads(attributes["vinsar_code"])),
+            ("library", json.loads(attributes["vinsar_libraries"])),
+        ):
+            for key, value in values.items():
+                result[title].setdefault(key, {})[attributes["vinsar_stage"]] = value
     summary = folder / "accuracy.json"
     if summary.is_file():
-        result["accuracy"] = dict(_leaves(json.loads(summary.read_text(encoding="utf-8"))))
+        for key, value in _leaves(json.loads(summary.read_text(encoding="utf-8"))):
+            result["accuracy"][key] = {"accuracy_summary": value}
     return result
 
 

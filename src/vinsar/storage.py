@@ -50,9 +50,19 @@ def atomic(path: str | Path) -> Iterator[Path]:
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
+        _reach_disk(temporary, path)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _reach_disk(temporary: Path, path: Path) -> None:
+    # Else a power cut may leave the final name with nothing behind it.
+    with temporary.open("rb+") as file:
+        try:
+            os.fsync(file.fileno())
+        except OSError as error:
+            raise OSError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 def write(

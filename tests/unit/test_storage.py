@@ -128,3 +128,13 @@ def test_an_edited_file_is_refused(tmp_path):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"absent\.nc does not exist"):
         storage.read(tmp_path / "absent.nc", "images")
+
+
+def test_what_cannot_reach_the_disk_takes_no_name(tmp_path, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match=r"cannot write .*a\.nc: No space left on device"):
+        storage.write(images(), tmp_path / "a.nc", "images")
+    assert list(tmp_path.iterdir()) == []

@@ -31,7 +31,10 @@ def configuration(*sections):
 
 def sources_of(*modules, script):
     """The files that a job runs: its script and, what Snakemake does not follow, the library."""
-    library = [os.path.relpath(path) for path in provenance.sources_of(*modules)]
+    # The bytes of a result depend on how it is stored, too.
+    library = [
+        os.path.relpath(path) for path in provenance.sources_of(*modules, "storage")
+    ]
     return [*library, f"workflow/scripts/{script}.py", "workflow/scripts/job.py"]
 
 

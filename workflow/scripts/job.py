@@ -74,6 +74,8 @@ def record(snakemake, started, seconds):
             started=started,
             seconds=seconds,
             rule=snakemake.rule,
+            job=" ".join([snakemake.rule, *snakemake.wildcards]),
+            threads=snakemake.threads,
             inputs=product_paths(snakemake),
         )
 
