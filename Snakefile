@@ -40,7 +40,7 @@ rule all:
         expand(
             "<results>/figures/{figure}.{suffix}",
             figure=STUDY.outputs.figures,
-            suffix=SUFFIXES,
+            suffix=STUDY.figures.formats,
         ),
         "<results>/accuracy.json",
         expand(

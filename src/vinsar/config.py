@@ -371,6 +371,19 @@ class Figures(Section):
     height_colormap: str = _key("colour map of heights, truth and reconstruction alike", "Fig. 3")
     phase_colormap: str = _key("cyclic colour map of wrapped phases", "Fig. 3")
     amplitude_range_db: float = _key("dynamic range of the images", "Fig. 3", gt=0)
+    one_column_mm: float = _key(
+        "width of the figures of one column; the height goes with it", "not given", ge=70, le=140
+    )
+    two_columns_mm: float = _key(
+        "width of the figures of two columns; the height goes with it", "not given", ge=140, le=280
+    )
+    font_size_pt: float = _key("size of the figures' text at any width", "not given", ge=5, le=12)
+    font: Literal["sans", "serif"] = _key(
+        "DejaVu Sans or STIX, which is like Times; files embed it", "not given"
+    )
+    formats: Annotated[
+        tuple[Literal["pdf", "svg", "png"], ...], Field(strict=False, min_length=1)
+    ] = _key("files of each figure; the reports show the PNG", "not given")
     png_dpi: int = _key("resolution of the PNG files", "not given", ge=50, le=1200)
 
 

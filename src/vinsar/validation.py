@@ -674,6 +674,26 @@ def _colormaps(figures: config.Figures) -> Iterator[Fault]:
             yield Fault(f"figures.{key}", name, str(error))
 
 
+def _text_fits(figures: config.Figures) -> Iterator[Fault]:
+    # The figures are laid out for text of 7.5 pt on 88 and 180 mm, with some room to spare.
+    widths = {"one_column_mm": 88.0, "two_columns_mm": 180.0}
+    most = min(8.0 * getattr(figures, key) / laid_out for key, laid_out in widths.items())
+    if figures.font_size_pt > most * (1 + 1e-9):
+        yield Fault(
+            "figures.font_size_pt",
+            figures.font_size_pt,
+            f"must be at most {most:.2f} for figures {figures.one_column_mm:g} and "
+            f"{figures.two_columns_mm:g} mm wide, or their text would overlap",
+        )
+
+
+def _figure_files(figures: config.Figures) -> Iterator[Fault]:
+    if "png" not in figures.formats:
+        yield Fault("figures.formats", figures.formats, "must hold png, which the reports show")
+    if len(set(figures.formats)) < len(figures.formats):
+        yield Fault("figures.formats", figures.formats, "must hold each format once")
+
+
 def _baseline_short(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
     derived = _Derived.of(radar)
     x = float(np.clip(0.0, scene.x_min_m, scene.x_max_m))
@@ -739,6 +759,8 @@ _WITHIN_SECTIONS: tuple[Rule, ...] = (
     _heights_rise,
     _reference_exists,
     _colormaps,
+    _text_fits,
+    _figure_files,
 )
 _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _odd_windows,

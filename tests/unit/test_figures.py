@@ -154,7 +154,7 @@ def drawn_texts(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> dict[Text, A
             texts.append(self)
         original(self, renderer)
 
-    with monkeypatch.context() as patch, style.applied():
+    with monkeypatch.context() as patch, style.applied(style.options_of(figure)):
         patch.setattr(Text, "draw", recording)
         figure.draw_without_rendering()
         return {text: text.get_window_extent() for text in texts}
@@ -179,7 +179,7 @@ def check_readable(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> None:
             x = min(box.x1, other_box.x1) - max(box.x0, other_box.x0)
             y = min(box.y1, other_box.y1) - max(box.y0, other_box.y0)
             assert x < 1 or y < 1, f"{text} lies on {other}"
-    with style.applied():
+    with style.applied(style.options_of(figure)):
         renderer = figure._get_renderer()  # type: ignore[attr-defined]
         areas = [axes.get_tightbbox(renderer) for axes in figure.axes]
     for index, area in enumerate(areas):
@@ -210,6 +210,40 @@ def test_figure_is_readable_and_takes_what_it_declares(
     assert width == pytest.approx(88 if name in NARROW else 180)
     assert height < 247  # fits on a page of A4 with its caption
     check_readable(figure, monkeypatch)
+
+
+def sizes(figure: Figure, monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    return sorted({round(text.get_fontsize(), 3) for text in drawn_texts(figure, monkeypatch)})
+
+
+@pytest.mark.parametrize(
+    "look",
+    [
+        {"font_size_pt": 8.0},
+        {"one_column_mm": 83.0, "two_columns_mm": 170.0, "font_size_pt": 7.0, "font": "serif"},
+    ],
+    ids=["large", "narrow"],
+)
+@pytest.mark.parametrize("name", NAMES)
+def test_figure_has_the_width_and_the_text_asked_for_and_stays_readable(
+    name: str,
+    look: dict[str, Any],
+    products: pipeline.Products,
+    study: config.Study,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = study.model_copy(update={"figures": study.figures.model_copy(update=look)})
+    validation.check(make_study(figures=look).model_dump(mode="json"))
+    usual, figure = draw(name, products, study), draw(name, products, asked)
+    width = asked.figures.one_column_mm if name in NARROW else asked.figures.two_columns_mm
+    shape = usual.get_figheight() / usual.get_figwidth()
+    assert figure.get_size_inches() * 25.4 == pytest.approx([width, shape * width])
+    check_readable(figure, monkeypatch)
+    scale = asked.figures.font_size_pt / study.figures.font_size_pt
+    expected = [round(size * scale, 3) for size in sizes(usual, monkeypatch)]
+    assert sizes(figure, monkeypatch) == pytest.approx(expected, abs=0.002)
+    fonts = {text.get_fontname() for text in drawn_texts(figure, monkeypatch)}
+    assert fonts == {"STIXGeneral" if asked.figures.font == "serif" else "DejaVu Sans"}
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,11 @@ def test_the_paper_is_wise():
     [
         ({"radar__baseline": 0.3}, "radar.baseline", "did you mean radar.baseline_m"),
         ({"radr": {}}, "radr", "did you mean radar"),
+        ({"figures__font_size_pt": 8.1}, "figures.font_size_pt", "at most 8.00 for figures 88 and"),
+        ({"figures__two_columns_mm": 160.0}, "figures.font_size_pt", "at most 7.11"),
+        ({"figures__formats": ["pdf"]}, "figures.formats", "must hold png"),
+        ({"figures__formats": ["png", "png"]}, "figures.formats", "each format once"),
+        ({"figures__formats": ["jpg"]}, "figures.formats[0]", "'pdf', 'svg' or 'png'"),
         ({"seed": -1}, "seed", "greater than or equal to 0"),
         ({"study": "a/b"}, "study", "match pattern"),
         ({"scene__terrain": "peak"}, "scene.terrain", "'peaks' or 'flat'"),

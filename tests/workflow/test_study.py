@@ -102,8 +102,9 @@ def test_a_touch_reruns_nothing(checkout):
     assert checkout.would_run() == set()
 
 
-def test_a_colour_map_reruns_only_figures(checkout):
-    assert checkout.would_run("figures: {height_colormap: viridis}\n") == FIGURE_RULES
+def test_the_look_of_figures_reruns_only_figures(checkout):
+    look = "height_colormap: viridis, two_columns_mm: 170.0, font: serif, formats: [svg, png]"
+    assert checkout.would_run(f"figures: {{{look}}}\n") == FIGURE_RULES
 
 
 def test_a_filter_setting_reruns_the_filter_and_what_follows(checkout):

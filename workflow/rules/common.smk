@@ -7,8 +7,6 @@ from snakemake.logging import logger
 
 from vinsar import claims, figures, pipeline, provenance, sweep, validation
 
-SUFFIXES = ("pdf", "svg", "png")
-
 try:
     STUDY = validation.check(config)
     figures.check(STUDY)
@@ -82,8 +80,12 @@ def figure_files(*names, caption):
     files = []
     for name in names:
         stem = f"<results>/figures/{name}"
-        png = report(f"{stem}.png", labels={"figure": name}, **shown)
-        files += [f"{stem}.pdf", f"{stem}.svg", png]
+        for suffix in STUDY.figures.formats:
+            path = f"{stem}.{suffix}"
+            shows = suffix == "png"
+            files.append(
+                report(path, labels={"figure": name}, **shown) if shows else path
+            )
     return files
 
 

@@ -143,7 +143,7 @@ def _side(
         f"scene, {scene[0]:g} … {scene[1]:g} m ahead",
         ha="center",
         va="top",
-        fontsize=6.5,
+        fontsize=style.points(6.5),
     )
     _vehicle(axes, scheme.lower[1])
     target, lower, upper = scheme.target, scheme.lower, scheme.upper
@@ -170,7 +170,12 @@ def _side(
         )
     axes.annotate("", (0, 0), tuple(lower), arrowprops=_DIMENSION)
     axes.text(
-        -unit, 0.42 * lower[1], f"$H_0$ = {lower[1]:g} m", ha="right", va="center", fontsize=7
+        -unit,
+        0.42 * lower[1],
+        f"$H_0$ = {lower[1]:g} m",
+        ha="right",
+        va="center",
+        fontsize=style.points(7),
     )
     radius = 0.5 * lower[1]
     if radius > 7 * unit:
@@ -195,7 +200,9 @@ def _side(
             linestyle=":",
         )
     )
-    axes.annotate("(b)", (zoom[0], zoom[3]), (0, 1), textcoords="offset points", fontsize=6.5)
+    axes.annotate(
+        "(b)", (zoom[0], zoom[3]), (0, 1), textcoords="offset points", fontsize=style.points(6.5)
+    )
     axes.set_xlabel("y, ahead (m)")
     axes.set_ylabel("z (m)")
     axes.xaxis.set_major_locator(style.round_ticks(11))
@@ -363,7 +370,7 @@ def _values(axes: Axes, study: config.Study) -> None:
             axes.text(0, row, name, va="center")
             axes.text(1, row, value, va="center", ha="right")
         else:
-            axes.text(0, row + 0.2, "At the target T", va="center", fontsize=8)
+            axes.text(0, row + 0.2, "At the target T", va="center", fontsize=style.points(8))
 
 
 def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None:
@@ -393,7 +400,7 @@ def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None
         (0, 3),
         textcoords="offset points",
         ha="center",
-        fontsize=6.5,
+        fontsize=style.points(6.5),
     )
     axes.add_patch(_area(image, fill=False, edgecolor=style.INK, linewidth=0.7))
     end = study.radar.aperture_length_m / 2

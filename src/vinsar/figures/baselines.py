@@ -355,7 +355,7 @@ def _heat(axes: Axes, part: xr.DataArray, field: Floats, limits: tuple[float, fl
         casing: list[Any] = [patheffects.withStroke(linewidth=1.6, foreground="black")]
         lines = axes.contour(field, levels=inside, colors="white", linewidths=0.8)
         lines.set_path_effects(casing)
-        texts = axes.clabel(lines, fmt="%g cm", fontsize=7, inline_spacing=3)
+        texts = axes.clabel(lines, fmt="%g cm", fontsize=style.points(7), inline_spacing=3)
         for text in texts:
             text.set_path_effects(casing)
     names = ("motion_level_wavelengths", "radar_baseline_m")

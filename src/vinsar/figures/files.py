@@ -56,7 +56,7 @@ def save(
                 f"'{path}' has the suffix '{path.suffix}'; a figure is written as "
                 f"{', '.join('.' + name for name in FORMATS)}"
             )
-    with style.applied():
+    with style.applied(style.options_of(figure)):
         for path in targets:
             kind = path.suffix.lstrip(".")
             part = path.with_name(f".{path.name}.{os.getpid()}.part")

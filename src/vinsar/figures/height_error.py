@@ -192,6 +192,13 @@ def _table(axes: Axes, accuracy: xr.Dataset) -> None:
     right = (0.0, 0.315, 0.44, 0.535, 0.655, 0.775, 0.90, 1.0)
     for row, level in zip(table_rows(accuracy), (0.86, 0.72, 0.50, 0.30, 0.10), strict=True):
         for column, (text, at) in enumerate(zip(row, right, strict=True)):
-            axes.text(at, level, text, ha="right" if column else "left", va="center", fontsize=6.8)
+            axes.text(
+                at,
+                level,
+                text,
+                ha="right" if column else "left",
+                va="center",
+                fontsize=style.points(6.8),
+            )
     for level in (0.98, 0.62, 0.0):
         axes.plot([0, 1], [level, level], color=style.INK, linewidth=0.5, clip_on=False)

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 # A tenth of a resolution cell is what the paper allows without registration (section 1.3).
 _ALLOWED_SHARE = 0.1
 _HEIGHT_MM = 88.0
-_NAMES = {"near": "near target", "far": "far target"}
 
 
 @style.styled
@@ -123,8 +122,7 @@ def _curves(
 
 def _title(registration: xr.Dataset, ground_axis: str, target: str, letter: str) -> str:
     x, y = registration["target_position"].sel(target=target).values
-    name = _NAMES.get(target, target)
-    return f"({letter}) in {ground_axis}, {name} ({x:g}, {y:g}) m"
+    return f"({letter}) in {ground_axis}, {target} ({x:g}, {y:g}) m"
 
 
 def _map(figure: Figure, registration: xr.Dataset) -> None:

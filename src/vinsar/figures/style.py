@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 from vinsar import colormaps
 
@@ -16,11 +18,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.ticker import Locator
 
+    from vinsar import config
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
+# The widths and the size of text for which the figures are laid out. The configuration may ask for
+# others: then the layout is enlarged or reduced as a whole, and the text has the size asked for.
 TWO_COLUMNS_MM = 180.0
 ONE_COLUMN_MM = 88.0
+FONT_SIZE_PT = 7.5
 MM_PER_INCH = 25.4
 TITLE_GAP_MM = 1.5
 
@@ -28,9 +35,7 @@ BLUE, ORANGE, GREY, INK = "#0067a5", "#d95f02", "#8a8f94", "#1a1a1a"
 NO_DATA = "#c9c9c9"
 
 STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 7.5,
-    "mathtext.fontset": "dejavusans",
+    "font.size": FONT_SIZE_PT,
     "axes.titlesize": 8,
     "axes.titlelocation": "left",
     "axes.titlepad": 4.25,
@@ -70,23 +75,63 @@ STYLE: dict[str, Any] = {
 }
 
 
+# Both come with Matplotlib, so that figures are the same on every machine.
+FONTS: dict[str, dict[str, Any]] = {
+    "sans": {"font.family": "DejaVu Sans", "mathtext.fontset": "dejavusans"},
+    "serif": {"font.family": "STIXGeneral", "mathtext.fontset": "stix"},
+}
+
+_IN_POINTS = tuple(key for key in STYLE if key.endswith(("size", "pad", "width")))
+
+_options: ContextVar[config.Figures | None] = ContextVar("_options", default=None)
+# What each figure was made with, and its size over that in the layout.
+_OF_FIGURE: WeakKeyDictionary[Figure, tuple[config.Figures | None, float]] = WeakKeyDictionary()
+
+
 @contextmanager
-def applied() -> Iterator[None]:
-    """Apply the style within the block, whatever the user's own settings are, and undo it after."""
+def applied(options: config.Figures | None = None) -> Iterator[None]:
+    """Apply the style within the block, whatever the user's own settings are, and undo it after.
+
+    Parameters
+    ----------
+    options
+        Widths, size of text and font; without them, those of the layout.
+    """
     import matplotlib
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
-        yield
+    scale = text_scale(options)
+    sizes = {key: STYLE[key] * scale for key in _IN_POINTS}
+    token = _options.set(options)
+    try:
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()
+            look = STYLE | sizes | FONTS["sans" if options is None else options.font]
+            matplotlib.rcParams.update(look)  # type: ignore[arg-type]
+            yield
+    finally:
+        _options.reset(token)
+
+
+def text_scale(options: config.Figures | None) -> float:
+    """Return the size of text over that of the layout."""
+    return 1.0 if options is None else options.font_size_pt / FONT_SIZE_PT
+
+
+def points(size: float) -> float:
+    """Return a size of text, given for the layout's text of 7.5 pt, as the style has it, pt."""
+    return size * text_scale(_options.get())
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
-    """Make a function draw in the style."""
+    """Make a function draw in the style that the figures' section of its study asks for.
+
+    The study is the function's last argument.
+    """
 
     @functools.wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
-        with applied():
+        study: Any = kwargs.get("study", args[-1] if args else None)
+        with applied(study.figures):
             return draw(*args, **kwargs)
 
     return wrapper
@@ -98,7 +143,8 @@ def new_figure(width_mm: float, height_mm: float) -> Figure:
     Parameters
     ----------
     width_mm, height_mm
-        Size on paper, mm.
+        Size in the layout, mm. A figure as wide as one or two columns becomes as wide as the
+        configuration has them, and higher or lower with it.
 
     Returns
     -------
@@ -107,17 +153,33 @@ def new_figure(width_mm: float, height_mm: float) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH))
+    options, scale = _options.get(), 1.0
+    if options is not None:
+        columns = {
+            ONE_COLUMN_MM: options.one_column_mm,
+            TWO_COLUMNS_MM: options.two_columns_mm,
+        }
+        scale = columns.get(width_mm, width_mm) / width_mm
+    size = (width_mm * scale / MM_PER_INCH, height_mm * scale / MM_PER_INCH)
+    figure = Figure(figsize=size)
+    _OF_FIGURE[figure] = (options, scale)
+    return figure
+
+
+def options_of(figure: Figure) -> config.Figures | None:
+    """Return the options that a figure was made with."""
+    return _OF_FIGURE.get(figure, (None, 1.0))[0]
 
 
 def page_mm(figure: Figure) -> tuple[float, float]:
-    """Return the width and height of a figure, mm."""
+    """Return the width and height of a figure in the layout, mm."""
     width, height = figure.get_size_inches()
-    return float(width) * MM_PER_INCH, float(height) * MM_PER_INCH
+    scale = _OF_FIGURE.get(figure, (None, 1.0))[1]
+    return float(width) * MM_PER_INCH / scale, float(height) * MM_PER_INCH / scale
 
 
 def size_mm(axes: Axes) -> tuple[float, float]:
-    """Return the width and height of axes, mm."""
+    """Return the width and height of axes in the layout, mm."""
     figure: Any = axes.get_figure(root=True)
     width, height = page_mm(figure)
     box = axes.get_position()
@@ -128,7 +190,10 @@ def write_title(figure: Figure, left_mm: float, top_mm: float, text: str) -> Non
     """Write the title of axes whose upper left corner is at this place, mm."""
     width, height = page_mm(figure)
     figure.text(
-        left_mm / width, (top_mm + TITLE_GAP_MM) / height, text, fontsize=STYLE["axes.titlesize"]
+        left_mm / width,
+        (top_mm + TITLE_GAP_MM) / height,
+        text,
+        fontsize=points(STYLE["axes.titlesize"]),
     )
 
 
@@ -147,7 +212,7 @@ def place(
     height_mm: float,
     **options: Any,
 ) -> Axes:
-    """Add axes at a fixed place on the paper.
+    """Add axes at a fixed place of the layout.
 
     Parameters
     ----------

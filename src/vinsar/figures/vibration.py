@@ -64,7 +64,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     axes = style.place(figure, _LEFTS[2], _BOTTOM, _WIDTH, _TALL)
     _focus(axes, sweep["point_gain"].sel(motion_channels=modes[0]))
     curves, _ = axes.get_legend_handles_labels()
-    sweeps.legend(figure, [*curves, sweeps.band_patch(), *handles], _LEFTS[0], 2.0, 4)
+    sweeps.legend(figure, [*curves, sweeps.band_patch(), *handles], 8.0, 2.0, 4)
     return figure
 
 
