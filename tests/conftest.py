@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from vinsar import echo, geometry, imaging, trajectory, variables
+from vinsar import echo, imaging, trajectory, variables
 
 settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=60)
 settings.load_profile("reproducible")
@@ -78,24 +78,31 @@ def ideal_phase():
             # y of the circle around the lower aperture that passes through the pixel.
             square = (grid_y - lower[1]) ** 2 + lower[2] ** 2 - (lower[2] - height) ** 2
             true_y = lower[1] + np.sqrt(square)
-        difference = geometry.slant_range(lower, grid_x, true_y, height) - geometry.slant_range(
-            upper, grid_x, true_y, height
-        )
-        ground = geometry.slant_range(lower, grid_x, grid_y) - geometry.slant_range(
-            upper, grid_x, grid_y
-        )
-        phase = -4 * np.pi / wavelength * (difference - ground) + constant
+
+        def difference(*points):
+            """r1 - r2."""
+            ranges = [
+                np.linalg.norm(np.stack(points, -1) - antenna, axis=-1)
+                for antenna in (lower, upper)
+            ]
+            return ranges[0] - ranges[1]
+
+        ground = difference(grid_x, grid_y, np.zeros_like(grid_x))
+        phase = -4 * np.pi / wavelength * (difference(grid_x, true_y, height) - ground) + constant
         unwrapped = variables.dataset(
             "unwrapped",
             {"phase": phase, "residue": np.zeros(phase.shape, np.int8)},
             {"x": x, "y": y},
         )
+        along = np.array([[-0.4, 0.0, 0.0], [0.4, 0.0, 0.0]])
+        antennas = np.array([lower, upper])[:, None] + along
         images = variables.dataset(
             "images",
             {
                 "image": np.ones((2, *phase.shape), np.complex64),
                 "wavelength": wavelength,
-                "phase_center": np.array([lower, upper]),
+                "transmitter": antennas,
+                "receiver": antennas.copy(),
             },
             {"x": x, "y": y},
         )

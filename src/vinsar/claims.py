@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from vinsar import baseline, config, geometry, radar, variables
+from vinsar import aperture, baseline, config, geometry, radar, trajectory, variables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -317,19 +317,17 @@ def _unwrapped_agrees(products: Products) -> Claim:
     from scipy.ndimage import map_coordinates
 
     unwrapped, truth = products["unwrapped"], products["truth"]
-    lower, upper = products["images"]["phase_center"].values
+    lower, upper = trajectory.apertures(products["images"])
     wavelength = float(products["images"]["wavelength"])
     y, x = np.meshgrid(truth["y"].values, truth["x"].values, indexing="ij")
     height = truth["height"].values
     # The phase that the DEM set would have, where its cells are imaged.
-    image_y = lower[1] + geometry.circle_image_y(y - lower[1], height, lower[2])
-    expected = geometry.interferometric_phase(
-        geometry.slant_range(lower, x, y, height),
-        geometry.slant_range(upper, x, y, height),
-        wavelength,
-    ) - geometry.flat_earth_phase(lower, upper, x, image_y, wavelength)
+    image_x, image_y = aperture.image_position(lower, x, y, height)
+    expected = aperture.interferometric_phase(
+        lower, upper, x, y, height, wavelength
+    ) - aperture.flat_earth_phase(lower, upper, image_x, image_y, wavelength)
     rows = (image_y - y[0, 0]) / (y[1, 0] - y[0, 0])
-    columns = np.broadcast_to(np.arange(x.shape[1]), x.shape)
+    columns = (image_x - x[0, 0]) / (x[0, 1] - x[0, 0])
     phase = unwrapped["phase"].values + products["dem"]["phase_offset"].values
     found = map_coordinates(phase, [rows, columns], order=1, mode="constant", cval=np.nan)
     known = np.isfinite(found) & np.isfinite(expected)
@@ -396,10 +394,9 @@ def _grown(mask: Flags, products: Products, study: config.Study) -> Flags:
     x, y = products["dem"]["x"].values, products["dem"]["y"].values
     frequency = np.array([study.radar.start_frequency_hz, study.radar.stop_frequency_hz])
     cell = radar.ground_resolution(
-        np.array([0.0, 0.0, study.radar.rail_height_m]),
-        np.array(x.mean()),
-        np.array(y.mean()),
-        aperture_length_m=study.radar.aperture_length_m,
+        trajectory.apertures(trajectory.planned(study.radar))[0],
+        x.mean(),
+        y.mean(),
         frequency=frequency,
     )
     across, ahead = (int(np.ceil(size / (x[1] - x[0]))) for size in cell)

@@ -152,32 +152,6 @@ def critical_baseline(
     return wavelength_m * np.asarray(range_m) * np.tan(np.asarray(look)) / (2 * range_resolution_m)
 
 
-def flat_earth_phase(
-    lower: ArrayLike,
-    upper: ArrayLike,
-    x: ArrayLike,
-    y: ArrayLike,
-    wavelength_m: float,
-) -> Floats:
-    """Return the phase of the ground plane (Eq. 11, with the upper antenna's y offset), rad.
-
-    Parameters
-    ----------
-    lower, upper
-        Positions (x, y, z) of the two antennas, m.
-    x, y
-        Points on the ground plane, m, of shapes that broadcast.
-    wavelength_m
-        Wavelength, m.
-
-    Returns
-    -------
-    ndarray
-        Phase, rad, that focusing on the ground plane has removed.
-    """
-    return interferometric_phase(slant_range(lower, x, y), slant_range(upper, x, y), wavelength_m)
-
-
 def circle_image_y(y: ArrayLike, height: ArrayLike, antenna_height: float) -> Floats:
     """Return where an aperture along x images a raised target on the ground plane.
 
@@ -216,7 +190,7 @@ def radial_shift(
     """Return the paper's image shift (Eq. 6 with its missing term), in x and y.
 
     It moves the target radially. That is what a rotating antenna would do; a synthetic aperture
-    moves it along y alone (`circle_image_y`).
+    moves it as `aperture.image_position` has it.
 
     Parameters
     ----------
@@ -238,16 +212,6 @@ def radial_shift(
     ground = np.hypot(x, y)
     shift = np.sqrt((antenna_height - height) ** 2 - antenna_height**2 + ground**2) - ground
     return shift * x / ground, shift * y / ground
-
-
-def circle_shift(
-    x: ArrayLike, y: ArrayLike, height: ArrayLike, antenna_height: float
-) -> tuple[Floats, Floats]:
-    """Return the image shift in x (none) and y by the circle around the aperture axis, m."""
-    x, y, height = np.broadcast_arrays(
-        np.asarray(x, float), np.asarray(y, float), np.asarray(height, float)
-    )
-    return np.zeros_like(x), circle_image_y(y, height, antenna_height) - y
 
 
 def invert_height(

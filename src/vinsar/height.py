@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vinsar import geometry, variables
+from vinsar import aperture, trajectory, variables
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,11 +91,11 @@ def phase_offset(
     from scipy.ndimage import map_coordinates
 
     x, y = unwrapped["x"].values, unwrapped["y"].values
-    lower, upper = images["phase_center"].values
+    lower, upper = trajectory.apertures(images)
     wavelength = float(images["wavelength"])
     point_x, point_y, point_height = points
-    image_y = lower[1] + geometry.circle_image_y(point_y - lower[1], point_height, lower[2])
-    column = (point_x - x[0]) / (x[1] - x[0])
+    image_x, image_y = aperture.image_position(lower, point_x, point_y, point_height)
+    column = (image_x - x[0]) / (x[1] - x[0])
     row = (image_y - y[0]) / (y[1] - y[0])
     # A pixel's width of tolerance: declared ground may end at the image's edge.
     inside = (row > -1) & (row < y.size) & (column > -1) & (column < x.size)
@@ -105,19 +105,17 @@ def phase_offset(
             f"the reference point at x = {point_x[first]:.2f} m, y = {point_y[first]:.2f} m is "
             "imaged outside the grid"
         )
-    absolute = geometry.interferometric_phase(
-        geometry.slant_range(lower, point_x, point_y, point_height),
-        geometry.slant_range(upper, point_x, point_y, point_height),
-        wavelength,
+    absolute = aperture.interferometric_phase(
+        lower, upper, point_x, point_y, point_height, wavelength
     )
-    flat = geometry.flat_earth_phase(lower, upper, point_x, image_y, wavelength)
+    flat = aperture.flat_earth_phase(lower, upper, image_x, image_y, wavelength)
     found = map_coordinates(unwrapped["phase"].values, [row, column], order=1, mode="nearest")
     missing = absolute - flat - found
     if trend == "constant":
         return np.full((y.size, x.size), np.median(missing))
     if len(missing) < 3:
         raise ValueError(f"a plane needs three or more reference points, not {len(missing)}")
-    design = np.stack([np.ones_like(point_x), point_x, image_y - y[0]], axis=1)
+    design = np.stack([np.ones_like(image_x), image_x, image_y - y[0]], axis=1)
     constant, slope_x, slope_y = _least_absolute(design, missing)
     return np.asarray(constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0]))
 
@@ -134,13 +132,13 @@ def _least_absolute(design: Floats, values: Floats) -> Floats:
 
 
 def code_dem(
-    image_height: Floats, x: Floats, y: Floats, *, antenna_y: float, antenna_height: float
+    image_height: Floats, x: Floats, y: Floats, *, true_x: Floats, true_y: Floats
 ) -> Floats:
     """Move the image's heights to their true positions and resample them to the grid.
 
-    A pixel at (x, y') with height h belongs to (x, y) on the circle around the aperture axis
-    (`geometry.circle_true_y`): the paper's DEM coding. Along each column the heights are then
-    interpolated linearly. Where parts overlap (layover) they come in the order of y.
+    The paper's DEM coding. The heights, and the true x, are interpolated linearly in y along each
+    column of the image, and then the heights in x along each row of the grid, where the true x are
+    not those of the columns. Where parts overlap (layover) they come in the order of y.
 
     Parameters
     ----------
@@ -148,8 +146,8 @@ def code_dem(
         Heights at the image's pixels (y, x), m.
     x, y
         Axes of image and DEM, m.
-    antenna_y, antenna_height
-        Position of the lower aperture across its axis, m.
+    true_x, true_y
+        Where the pixels belong (y, x), m; NaN where that is not known.
 
     Returns
     -------
@@ -168,19 +166,24 @@ def code_dem(
             f"heights of shape {image_height.shape} are not on a grid of {(y.size, x.size)}"
         )
 
-    true_y = antenna_y + geometry.circle_true_y(
-        y[:, None] - antenna_y, image_height, antenna_height
-    )
     result = np.empty(image_height.shape)
     columns.resample(np.ascontiguousarray(image_height, float), true_y, y, result)
-    return result
+    known = np.isfinite(true_y)
+    if np.array_equal(true_x[known], np.broadcast_to(x, known.shape)[known]):
+        return result
+    place = np.empty(image_height.shape)
+    columns.resample(np.ascontiguousarray(true_x, float), true_y, y, place)
+    rows = np.empty((x.size, y.size))
+    columns.resample(np.ascontiguousarray(result.T), np.ascontiguousarray(place.T), x, rows)
+    return np.ascontiguousarray(rows.T)
 
 
 def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Dataset:
     """Invert the unwrapped phase to heights and code the DEM.
 
     The flat-earth phase (Eq. 11), which focusing on the ground plane has removed, is added back;
-    `geometry.invert_height` gives the height at the image's pixel, `code_dem` its true place.
+    `aperture.locate` gives the height and the true place of each pixel, and `code_dem` moves it
+    there.
 
     Parameters
     ----------
@@ -195,21 +198,14 @@ def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Data
         Product ``dem``.
     """
     x, y = unwrapped["x"].values, unwrapped["y"].values
-    lower, upper = images["phase_center"].values
+    lower, upper = trajectory.apertures(images)
     wavelength = float(images["wavelength"])
-    flat = geometry.flat_earth_phase(lower, upper, x[None, :], y[:, None], wavelength)
+    flat = aperture.flat_earth_phase(lower, upper, x[None, :], y[:, None], wavelength)
     absolute = unwrapped["phase"].values + flat + offset
-    across, up = upper[1] - lower[1], upper[2] - lower[2]
-    image_height = geometry.invert_height(
-        geometry.slant_range(lower, x[None, :], y[:, None]),
-        absolute,
-        baseline_m=float(np.hypot(across, up)),
-        baseline_angle=float(np.arctan2(up, across)),
-        antenna_height=float(lower[2]),
-        along_track=x[None, :] - lower[0],
-        wavelength_m=wavelength,
+    true_x, true_y, image_height = aperture.locate(
+        lower, upper, x[None, :], y[:, None], absolute, wavelength
     )
-    height = code_dem(image_height, x, y, antenna_y=float(lower[1]), antenna_height=float(lower[2]))
+    height = code_dem(image_height, x, y, true_x=true_x, true_y=true_y)
     unknown = int(np.isnan(height).sum())
     if unknown:
         logger.info("%d of %d cells of the DEM have no height", unknown, height.size)

@@ -217,7 +217,8 @@ def backproject(
         {
             "image": image,
             "wavelength": radar.wavelength(carrier),
-            "phase_center": trajectory.phase_centers(trajectory_),
+            "transmitter": transmitter,
+            "receiver": receiver,
         },
         {"channel": profiles["channel"].values, "x": x, "y": y},
     )

@@ -105,13 +105,7 @@ def image_axes(imaging_: config.Imaging) -> tuple[Floats, Floats]:
 
 def _trajectory(products: Products, study: config.Study) -> xr.Dataset:
     del products
-    return trajectory.rail(
-        aperture_length_m=study.radar.aperture_length_m,
-        position_spacing_m=study.radar.position_spacing_m,
-        rail_height_m=study.radar.rail_height_m,
-        baseline_m=study.radar.baseline_m,
-        baseline_angle_deg=study.radar.baseline_angle_deg,
-    )
+    return trajectory.planned(study.radar)
 
 
 def _displaced(products: Products, study: config.Study, affected: str) -> xr.Dataset:
@@ -263,20 +257,25 @@ def _filtered(products: Products, study: config.Study) -> xr.Dataset:
     return filtering.apply(products["interferogram"], **study.filtering.model_dump())
 
 
-def looks(study: config.Study) -> float:
+def looks(antennas: xr.Dataset, study: config.Study) -> float:
     """Return the effective number of looks of the coherence.
 
     The multilook window's area over that of a resolution cell at the middle of the image, at
     least 1: pixels finer than the resolution are not independent.
+
+    Parameters
+    ----------
+    antennas
+        Product ``trajectory``.
+    study
+        The configuration.
     """
     x, y = image_axes(study.imaging)
-    frequency = _frequency(study)
     cell = radar.ground_resolution(
-        np.array([0.0, 0.0, study.radar.rail_height_m]),
-        np.array((x[0] + x[-1]) / 2),
-        np.array((y[0] + y[-1]) / 2),
-        aperture_length_m=study.radar.aperture_length_m,
-        frequency=frequency,
+        trajectory.apertures(antennas)[0],
+        (x[0] + x[-1]) / 2,
+        (y[0] + y[-1]) / 2,
+        frequency=_frequency(study),
     )
     side = study.interferogram.coherence_window_px * study.imaging.grid_spacing_m
     return max(1.0, float(side**2 / (cell[0] * cell[1])))
@@ -287,7 +286,7 @@ def _unwrapped(products: Products, study: config.Study) -> xr.Dataset:
         products["filtered"],
         products["interferogram"]["coherence"],
         method=study.unwrapping.method,
-        looks=looks(study),
+        looks=looks(products["trajectory"], study),
     )
 
 
@@ -372,7 +371,7 @@ def _registration(products: Products, study: config.Study) -> xr.Dataset:
 
     x, y = image_axes(study.imaging)
     return registration.analyze(
-        trajectory.phase_centers(antennas),
+        trajectory.apertures(antennas),
         image_point,
         targets={
             "near": (options.near.x_m, options.near.y_m),
@@ -382,7 +381,6 @@ def _registration(products: Products, study: config.Study) -> xr.Dataset:
         x=x,
         y=y,
         map_height_m=options.map_height_m,
-        aperture_length_m=study.radar.aperture_length_m,
         frequency=frequency,
     )
 
@@ -476,16 +474,9 @@ STAGES: dict[str, Stage] = {
     "filtered": Stage(_filtered, ("interferogram",), ("filtering",), ("filtering",)),
     "unwrapped": Stage(
         _unwrapped,
-        ("filtered", "interferogram"),
-        (
-            *_WAVEFORM,
-            *_GRID,
-            "radar.rail_height_m",
-            "radar.aperture_length_m",
-            "interferogram",
-            "unwrapping",
-        ),
-        ("unwrapping", "radar"),
+        ("filtered", "interferogram", "trajectory"),
+        (*_WAVEFORM, *_GRID, "interferogram", "unwrapping"),
+        ("unwrapping", "radar", "trajectory"),
     ),
     "dem": Stage(_dem, ("unwrapped", "images"), ("height",), ("height",)),
     "accuracy": Stage(_accuracy, ("dem", "truth"), ("accuracy",), ("accuracy",)),
@@ -498,12 +489,7 @@ STAGES: dict[str, Stage] = {
     "registration": Stage(
         _registration,
         ("trajectory",),
-        (
-            *_WAVEFORM,
-            "radar.aperture_length_m",
-            "imaging",
-            "registration",
-        ),
+        (*_WAVEFORM, "imaging", "registration"),
         ("registration", "echo", "imaging"),
     ),
     "baseline_angle": Stage(

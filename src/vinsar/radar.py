@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vinsar import geometry
+from vinsar import aperture
 from vinsar.constants import SPEED_OF_LIGHT
 
 if TYPE_CHECKING:
@@ -91,26 +91,25 @@ def azimuth_resolution(
 
 
 def ground_resolution(
-    position: NDArray[np.floating],
-    x: NDArray[np.floating],
-    y: NDArray[np.floating],
+    aperture_: aperture.Aperture,
+    x: ArrayLike,
+    y: ArrayLike,
     *,
-    aperture_length_m: float,
     frequency: NDArray[np.floating],
 ) -> NDArray[np.floating]:
     """Return the resolution on the ground plane in x and y.
 
-    In y the slant-range cell ``c / 2W`` over ``dr/dy``; in x ``lambda r / 2L`` over the squared
-    cosine of the squint, by which the aperture shortens and the angle turns.
+    In y the path's cell ``c / W`` over the path's derivative by y; in x the wavelength over the
+    derivative by x of the path's change along the aperture. On a rail that is ``lambda r / 2L``
+    over the squared cosine of the squint, by which the aperture shortens and the angle turns; with
+    one end that stands still, twice as much.
 
     Parameters
     ----------
-    position
-        Centre of the aperture, m.
+    aperture_
+        The aperture.
     x, y
-        Points, m, of one shape.
-    aperture_length_m
-        Length of the aperture along x, m.
+        Points, m, of shapes that broadcast.
     frequency
         Frequencies, Hz.
 
@@ -119,12 +118,9 @@ def ground_resolution(
     ndarray, shape (2, ...)
         Resolution in x and y, m.
     """
-    range_ = geometry.slant_range(position, x, y)
-    wavelength_m = wavelength(carrier(frequency))
-    cell = range_resolution(float(frequency[-1] - frequency[0]))
-    squint_cosine_squared = 1 - ((x - position[0]) / range_) ** 2
-    along = azimuth_resolution(wavelength_m, range_, aperture_length_m) / squint_cosine_squared
-    return np.stack([along, cell * range_ / (y - position[1])])
+    path, slope = aperture.gradients(aperture_, x, y)
+    cell = 2 * range_resolution(float(frequency[-1] - frequency[0]))
+    return np.abs(np.stack([wavelength(carrier(frequency)) / slope[0], cell / path[1]]))
 
 
 def window(name: WindowName, count: int) -> NDArray[np.floating]:

@@ -1,7 +1,7 @@
 """How far the two images shift against each other when nothing is registered (Fig. 2).
 
-Three answers for each target: Eqs. 6-7 as the paper has them (a radial shift), the circle around
-the aperture axis, and what imaged point targets measure.
+Three answers for each target: Eqs. 6-7 as the paper has them (a radial shift), the point of equal
+path and slope (a circle around a rail, an ellipse otherwise), and what imaged targets measure.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar import geometry, radar, variables
+from vinsar import aperture, geometry, radar, variables
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     PointImager = Callable[[Floats], Focus]
 
 _REFINEMENTS = 3
-_FORMULAS = {"radial": geometry.radial_shift, "circle": geometry.circle_shift}
 
 
 def peak(values: NDArray[np.complexfloating], x: Floats, y: Floats) -> tuple[float, float]:
@@ -86,7 +85,7 @@ def measure_shift(imager: PointImager, target: Floats, resolution: Floats) -> Fl
 
 
 def analyze(
-    phase_centers: Floats,
+    apertures: Sequence[aperture.Aperture],
     imager: PointImager,
     *,
     targets: Mapping[str, tuple[float, float]],
@@ -94,15 +93,14 @@ def analyze(
     x: Floats,
     y: Floats,
     map_height_m: float,
-    aperture_length_m: float,
     frequency: Floats,
 ) -> xr.Dataset:
     """Compare the three answers for point targets of rising height, and map two over the scene.
 
     Parameters
     ----------
-    phase_centers
-        Centre of the aperture of each channel (channel, 3), m.
+    apertures
+        The aperture of each channel.
     imager
         As in `measure_shift`.
     targets
@@ -113,8 +111,6 @@ def analyze(
         Axes of the maps, m.
     map_height_m
         Target height of the maps, m.
-    aperture_length_m
-        Length of the aperture along x, m.
     frequency
         Frequencies, Hz.
 
@@ -124,22 +120,21 @@ def analyze(
         Product ``registration``; registration errors are lower minus upper.
     """
     ground = np.array(list(targets.values()))
-    lower, upper = phase_centers
     resolution = radar.ground_resolution(
-        lower, ground[:, 0], ground[:, 1], aperture_length_m=aperture_length_m, frequency=frequency
+        apertures[0], ground[:, 0], ground[:, 1], frequency=frequency
     )
     answers = {
-        name: _difference(formula, lower, upper, ground[:, :1], ground[:, 1:], heights)
+        name: _difference(formula, apertures, ground[:, :1], ground[:, 1:], heights)
         for name, formula in _FORMULAS.items()
     }
-    shift = np.empty((len(phase_centers), 2, len(ground), heights.size))
+    shift = np.empty((len(apertures), 2, len(ground), heights.size))
     for i, (at_x, at_y) in enumerate(ground):
         for j, height in enumerate(heights):
             target = np.array([at_x, at_y, height])
             shift[:, :, i, j] = measure_shift(imager, target, resolution[:, i])
     grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
     maps = {
-        f"map_{name}": _difference(formula, lower, upper, grid_x, grid_y, np.asarray(map_height_m))
+        f"map_{name}": _difference(formula, apertures, grid_x, grid_y, np.asarray(map_height_m))
         for name, formula in _FORMULAS.items()
     }
     return variables.dataset(
@@ -150,7 +145,7 @@ def analyze(
             "target_position": ground,
             "resolution": resolution,
             "map_resolution": radar.ground_resolution(
-                lower, grid_x, grid_y, aperture_length_m=aperture_length_m, frequency=frequency
+                apertures[0], grid_x, grid_y, frequency=frequency
             ),
             "map_height": map_height_m,
         }
@@ -160,16 +155,29 @@ def analyze(
     )
 
 
+def _radial_shift(
+    aperture_: aperture.Aperture, x: Floats, y: Floats, height: Floats
+) -> tuple[Floats, Floats]:
+    center = aperture_.center
+    return geometry.radial_shift(x - center[0], y - center[1], height, float(center[2]))
+
+
+def _equal_path_shift(
+    aperture_: aperture.Aperture, x: Floats, y: Floats, height: Floats
+) -> tuple[Floats, Floats]:
+    image_x, image_y = aperture.image_position(aperture_, x, y, height)
+    return image_x - x, image_y - y
+
+
+_FORMULAS = {"radial": _radial_shift, "equal_path": _equal_path_shift}
+
+
 def _difference(
     formula: Callable[..., tuple[Floats, Floats]],
-    lower: Floats,
-    upper: Floats,
+    apertures: Sequence[aperture.Aperture],
     x: Floats,
     y: Floats,
     height: Floats,
 ) -> Floats:
-    shifts = [
-        np.stack(np.broadcast_arrays(*formula(x - c[0], y - c[1], height, c[2])))
-        for c in (lower, upper)
-    ]
+    shifts = [np.stack(np.broadcast_arrays(*formula(part, x, y, height))) for part in apertures]
     return np.asarray(shifts[0] - shifts[1])

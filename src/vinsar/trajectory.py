@@ -6,11 +6,35 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar import geometry, variables
+from vinsar import aperture, geometry, variables
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
+
+    from vinsar import config
+
+
+def planned(radar: config.Radar) -> xr.Dataset:
+    """Return the antenna positions of a configuration.
+
+    Parameters
+    ----------
+    radar
+        Section ``radar``.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory``.
+    """
+    return rail(
+        aperture_length_m=radar.aperture_length_m,
+        position_spacing_m=radar.position_spacing_m,
+        rail_height_m=radar.rail_height_m,
+        baseline_m=radar.baseline_m,
+        baseline_angle_deg=radar.baseline_angle_deg,
+    )
 
 
 def rail(
@@ -61,21 +85,21 @@ def rail(
     return variables.dataset("trajectory", {"transmitter": antennas, "receiver": antennas.copy()})
 
 
-def phase_centers(trajectory: xr.Dataset) -> np.ndarray:
-    """Return the aperture's centre of each channel.
+def apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
+    """Return the aperture of each channel.
 
     Parameters
     ----------
     trajectory
-        Product ``trajectory``.
+        Product ``trajectory``, or ``images``, which hold the positions that they are focused with.
 
     Returns
     -------
-    ndarray, shape (channel, axis)
-        Mean over positions of the midpoint between transmitter and receiver, m.
+    list of aperture.Aperture
+        Straight lines through the positions (`aperture.fit`), by channel.
     """
-    midpoint = (trajectory["transmitter"].values + trajectory["receiver"].values) / 2
-    return np.asarray(midpoint.mean(axis=1))
+    ends = trajectory["transmitter"].values, trajectory["receiver"].values
+    return [aperture.fit(*channel) for channel in zip(*ends, strict=True)]
 
 
 def range_extent(

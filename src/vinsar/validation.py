@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from vinsar import colormaps, config, geometry, radar
+from vinsar import colormaps, config, geometry, radar, trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -522,6 +522,7 @@ class _Derived:
     shortest_wavelength: float
     range_cell: float
     unambiguous_range: float
+    aperture: Any
     lower: Any
     upper: Any
 
@@ -537,6 +538,7 @@ class _Derived:
             shortest_wavelength=radar.wavelength(section.stop_frequency_hz),
             range_cell=radar.range_resolution(float(frequency[-1] - frequency[0])),
             unambiguous_range=radar.unambiguous_range(float(frequency[1] - frequency[0])),
+            aperture=trajectory.apertures(trajectory.planned(section))[0],
             lower=np.array([0.0, 0.0, section.rail_height_m]),
             upper=np.array(
                 [
@@ -603,10 +605,7 @@ def _cell(radar_: config.Radar, part: config.Scene | config.Imaging) -> float:
     derived = _Derived.of(radar_)
     x = np.clip(0.0, part.x_min_m, part.x_max_m)
     cells = [
-        radar.ground_resolution(
-            derived.lower, np.asarray(x), np.asarray(y),
-            aperture_length_m=radar_.aperture_length_m, frequency=derived.frequency,
-        )
+        radar.ground_resolution(derived.aperture, x, y, frequency=derived.frequency)
         for y in (part.y_min_m, part.y_max_m)
     ]  # fmt: skip
     return float(np.min(cells))

@@ -181,9 +181,7 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
             "a unit point target on the ground plane gives amplitude 1 and phase 0",
         ),
         "wavelength": Variable((), "real", "m", "wavelength of the carrier"),
-        "phase_center": Variable(
-            ("channel", "axis"), "real", "m", "centre of the aperture of the channel"
-        ),
+        **_ANTENNAS,
     },
     "interferogram": {
         "interferogram": Variable(
@@ -261,12 +259,12 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
         "radial": Variable(
             _SHIFT, "real", "m", "registration error, radial shift (Eqs. 6-7)", "lower minus upper"
         ),
-        "circle": Variable(
+        "equal_path": Variable(
             _SHIFT,
             "real",
             "m",
-            "registration error, circle around the aperture axis",
-            "lower minus upper",
+            "registration error, points of equal path and slope",
+            "lower minus upper; a circle around a rail, an ellipse otherwise",
         ),
         "measured": Variable(
             _SHIFT,
@@ -294,11 +292,11 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
             "registration error over the scene, radial shift (Eqs. 6-7)",
             "lower minus upper",
         ),
-        "map_circle": Variable(
+        "map_equal_path": Variable(
             ("ground_axis", "y", "x"),
             "real",
             "m",
-            "registration error over the scene, circle around the aperture axis",
+            "registration error over the scene, points of equal path and slope",
             "lower minus upper",
         ),
         "map_resolution": Variable(

@@ -9,6 +9,7 @@ import pytest
 from scipy.special import spence
 
 from vinsar import (
+    aperture,
     echo,
     filtering,
     geometry,
@@ -90,10 +91,10 @@ def theory():
 
 
 def resolution_cells():
-    along, ahead = radar.ground_resolution(
-        np.array([0.0, 0.0, 2.0]), np.array(0.0), np.array(10.2), aperture_length_m=0.81,
-        frequency=FREQUENCY,
-    )  # fmt: skip
+    # 81 positions fill 81 steps.
+    place, travel = np.array([0.0, 0.0, 2.0]), np.array([0.81, 0.0, 0.0])
+    antenna = aperture.Aperture(place, place, travel, travel)
+    along, ahead = radar.ground_resolution(antenna, 0.0, 10.2, frequency=FREQUENCY)
     return np.ptp(X) * np.ptp(Y) / (along * ahead)
 
 

@@ -311,7 +311,7 @@ def test_registration_curves_are_the_product_s_in_millimetres(
         lines = {line.get_label(): line for line in axes.lines}
         for label, name in (
             ("radial (Eq. 7)", "radial"),
-            ("circle", "circle"),
+            ("circle", "equal_path"),
             ("measured on images", "measured"),
         ):
             np.testing.assert_allclose(lines[label].get_ydata(), 1000 * part[name].values)
@@ -325,7 +325,7 @@ def test_registration_curves_are_the_product_s_in_millimetres(
     # One scale for near and far, so that the eye compares them.
     assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
     assert figure.axes[2].get_ylim() == figure.axes[3].get_ylim()
-    share = np.abs(product["map_circle"].sel(ground_axis="y")) / (
+    share = np.abs(product["map_equal_path"].sel(ground_axis="y")) / (
         0.1 * product["map_resolution"].sel(ground_axis="y")
     )
     image = figure.axes[4].images[0]

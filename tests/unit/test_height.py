@@ -112,10 +112,10 @@ def test_a_point_imaged_outside_the_grid_is_refused(ideal_phase, x, y, z):
 
 
 def code(image_height, y, antenna_height=2.0, antenna_y=0.0):
-    return height.code_dem(
-        image_height, np.arange(float(image_height.shape[1])), y,
-        antenna_y=antenna_y, antenna_height=antenna_height,
-    )  # fmt: skip
+    x = np.arange(float(image_height.shape[1]))
+    true_y = geometry.circle_true_y(y[:, None] - antenna_y, image_height, antenna_height)
+    true_x = np.broadcast_to(x, image_height.shape)
+    return height.code_dem(image_height, x, y, true_x=true_x, true_y=antenna_y + true_y)
 
 
 @pytest.mark.parametrize("antenna_y", [0.0, 3.0])
@@ -164,6 +164,22 @@ def test_dem_coding_does_not_extrapolate_beyond_a_pixel():
     assert np.isfinite(found).tolist() == [False] * 3 + [True] * 5 + [False] * 3
 
 
+@pytest.mark.parametrize("turn", [-0.6, 0.2])
+def test_dem_coding_moves_heights_in_x_and_y(turn):
+    # Each pixel belongs a share of its height away, in a direction between the axes.
+    x, y = np.linspace(-1, 1, 81), np.linspace(8, 10, 81)
+    grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
+    image_x, image_y = grid_x, grid_y
+    for _ in range(60):
+        true_x, true_y = grid_x + turn * hill(image_x, image_y), grid_y + hill(image_x, image_y) / 3
+        image_x, image_y = true_x, true_y
+    found = height.code_dem(hill(true_x, true_y), x, y, true_x=true_x, true_y=true_y)
+    # Linear interpolation over places up to 2.5 cm, stretched by the slope of 0.4 to 3.4 cm,
+    # apart: 0.2 / 0.09 x 0.034^2 / 8 along each axis.
+    inside = (abs(grid_x) < 0.8) & (grid_y > 8.2) & (grid_y < 9.8)
+    np.testing.assert_allclose(found[inside], hill(grid_x, grid_y)[inside], atol=7e-4)
+
+
 @pytest.mark.parametrize("upper", [(0.0, 0.0, 2.3), (0.0, 0.15, 2.26), (0.0, -0.1, 2.28)])
 def test_inversion_gives_the_height_at_the_pixel_for_any_baseline(ideal_phase, upper):
     unwrapped, images = ideal_phase(hill, X, Y, upper=upper, constant=5.0)
@@ -171,7 +187,8 @@ def test_inversion_gives_the_height_at_the_pixel_for_any_baseline(ideal_phase, u
     image_height = dem["image_height"].values
     true_y = geometry.circle_true_y(GRID_Y, image_height, 2.0)
     np.testing.assert_allclose(image_height, hill(GRID_X, true_y), atol=1e-9)
-    flat_earth = geometry.flat_earth_phase((0, 0, 2.0), upper, GRID_X, GRID_Y, 0.0214)
+    ranges = [geometry.slant_range(place, GRID_X, GRID_Y) for place in ((0, 0, 2.0), upper)]
+    flat_earth = -4 * np.pi * (ranges[0] - ranges[1]) / 0.0214
     np.testing.assert_allclose(
         dem["absolute_phase"], unwrapped["phase"].values - 5.0 + flat_earth, atol=1e-9
     )

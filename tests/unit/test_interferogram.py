@@ -20,7 +20,8 @@ def images(lower, upper):
         {
             "image": np.stack([lower, upper]).astype(np.complex64),
             "wavelength": 0.0214,
-            "phase_center": np.zeros((2, 3)),
+            "transmitter": np.zeros((2, 1, 3)),
+            "receiver": np.zeros((2, 1, 3)),
         },
         {"x": 0.1 * np.arange(columns), "y": 5 + 0.1 * np.arange(rows)},
     )

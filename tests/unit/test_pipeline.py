@@ -111,9 +111,10 @@ def test_control_points_and_level_ground_agree(study, products):
     assert abs(offsets[0] - offsets[1]) < 2 * np.pi / 10
 
 
-def test_the_looks_count_resolution_cells(study):
+def test_the_looks_count_resolution_cells(study, products):
     fine = changed(study, "interferogram", coherence_window_px=1)
     wide = changed(study, "interferogram", coherence_window_px=31)
-    assert pipeline.looks(fine) == 1
+    assert pipeline.looks(products["trajectory"], fine) == 1
     # 31 pixels of 5 cm against cells of about 0.074 m x 0.20 m (0.6 m aperture, 11.2 m range).
-    assert pipeline.looks(wide) == pytest.approx(1.55**2 / (0.0763 * 0.2), rel=0.03)
+    found = pipeline.looks(products["trajectory"], wide)
+    assert found == pytest.approx(1.55**2 / (0.0763 * 0.2), rel=0.03)

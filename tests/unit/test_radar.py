@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import radar
+from vinsar import aperture, radar
 
 WINDOWS = ("rectangular", "hann", "hamming", "blackman")
 LIGHT = 299_792_458.0
@@ -64,12 +64,14 @@ def test_azimuth_resolution_turns_the_phase_along_the_aperture_by_one_cycle():
     assert path[0] - path[1] == pytest.approx(wavelength, rel=1e-6)
 
 
+def monostatic(length):
+    place, travel = np.array([0.0, 0.0, 2.0]), np.array([length, 0.0, 0.0])
+    return aperture.Aperture(place, place, travel, travel)
+
+
 def test_ground_resolution_straight_ahead_is_that_of_band_and_aperture():
     frequency = radar.frequencies(13e9, 15e9, 201)
-    along, ahead = radar.ground_resolution(
-        np.array([0.0, 0.0, 2.0]), np.array(0.0), np.array(13.0), aperture_length_m=0.8,
-        frequency=frequency,
-    )  # fmt: skip
+    along, ahead = radar.ground_resolution(monostatic(0.8), 0.0, 13.0, frequency=frequency)
     slant = np.hypot(13, 2)
     assert along == pytest.approx(LIGHT / 14e9 * slant / 1.6)
     # c / 2W on the slant is longer on the ground by the cosine of the depression.
@@ -80,9 +82,7 @@ def test_ground_resolution_off_the_axis_is_the_slope_of_ranges_and_bearings():
     # Differences of exact ranges: between the aperture's ends over x, and over y.
     frequency = radar.frequencies(13e9, 15e9, 201)
     position, x, y = np.array([0.0, 0.0, 2.0]), 3.0, 8.0
-    along, ahead = radar.ground_resolution(
-        position, np.array(x), np.array(y), aperture_length_m=0.8, frequency=frequency
-    )
+    along, ahead = radar.ground_resolution(monostatic(0.8), x, y, frequency=frequency)
     ends = np.array([[-0.4, 0, 2.0], [0.4, 0, 2.0]])
     step = 1e-5
 

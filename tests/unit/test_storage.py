@@ -13,7 +13,8 @@ def images():
         {
             "image": (rng.normal(size=(2, 3, 4)) + 1j * rng.normal(size=(2, 3, 4))).astype("c8"),
             "wavelength": 0.0214,
-            "phase_center": np.zeros((2, 3)),
+            "transmitter": np.zeros((2, 1, 3)),
+            "receiver": np.zeros((2, 1, 3)),
         },
         {"x": np.arange(4.0), "y": np.arange(3.0)},
     )

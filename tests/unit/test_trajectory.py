@@ -60,13 +60,12 @@ def test_a_spacing_that_does_not_divide_the_aperture_is_refused():
         make(90.0, position_spacing_m=0.03)
 
 
-def test_phase_centers_lie_midway_between_transmitter_and_receiver(rail, bistatic):
-    np.testing.assert_allclose(
-        trajectory.phase_centers(rail), [[0, 0, 2.0], [0, 0, 2.3]], atol=1e-12
-    )
-    np.testing.assert_allclose(
-        trajectory.phase_centers(bistatic), [[0.15, -0.05, 2.1], [0.15, -0.05, 2.4]], atol=1e-12
-    )
+def test_apertures_are_the_lines_of_each_channel(rail, bistatic):
+    for antennas, midway in ((rail, [0, 0, 0]), (bistatic, [0.15, -0.05, 0.1])):
+        for found, height in zip(trajectory.apertures(antennas), (2.0, 2.3), strict=True):
+            np.testing.assert_allclose(found.center, np.add(midway, [0, 0, height]), atol=1e-12)
+            for travel in (found.transmitter_travel, found.receiver_travel):
+                np.testing.assert_allclose(travel, [0.8, 0, 0], atol=1e-12)
 
 
 @given(

@@ -38,6 +38,7 @@ rule unwrapped:
     input:
         filtered="<results>/filtered.nc",
         interferogram="<results>/interferogram.nc",
+        trajectory="<results>/trajectory.nc",
         code=stage_sources("unwrapped"),
     output:
         "<results>/unwrapped.nc",

@@ -71,7 +71,7 @@ def draw(products: Products, study: config.Study) -> Figure:
 def _limit(registration: xr.Dataset, ground_axis: str) -> float:
     """Return the limit of the error axis of a row of panels, mm: as far as its curves need."""
     part = registration.sel(ground_axis=ground_axis)
-    largest = max(float(np.abs(part[name]).max()) for name in ("radial", "circle", "measured"))
+    largest = max(float(np.abs(part[name]).max()) for name in ("radial", "equal_path", "measured"))
     bands = _ALLOWED_SHARE * part["resolution"].values
     # The edge of a band a little beyond the curves is worth the room; one far beyond is not.
     near = bands[bands < 1.6 * largest]
@@ -95,7 +95,7 @@ def _curves(
         linestyle="--",
         label="radial (Eq. 7)",
     )
-    axes.plot(height, 1000 * part["circle"].values, color=style.BLUE, label="circle")
+    axes.plot(height, 1000 * part["equal_path"].values, color=style.BLUE, label="circle")
     axes.plot(
         height,
         1000 * part["measured"].values,
@@ -109,7 +109,7 @@ def _curves(
     axes.set_ylim(-limit, limit)
     margin = 0.04 * (height[-1] - height[0])
     axes.set_xlim(height[0] - margin, height[-1] + margin)
-    rises = part["circle"].values[-1] >= part["circle"].values[0]
+    rises = part["equal_path"].values[-1] >= part["equal_path"].values[0]
     axes.text(
         0.97,
         0.05 if rises else 0.95,
@@ -128,7 +128,7 @@ def _title(registration: xr.Dataset, ground_axis: str, target: str, letter: str)
 def _map(figure: Figure, registration: xr.Dataset) -> None:
     """Draw the error by the circle over the scene, in tenths of a resolution cell."""
     part = registration.sel(ground_axis="y")
-    share = abs(part["map_circle"]) / (_ALLOWED_SHARE * part["map_resolution"])
+    share = abs(part["map_equal_path"]) / (_ALLOWED_SHARE * part["map_resolution"])
     title = f"(e) in y by the circle, height {float(registration['map_height']):g} m"
     axes = maps.place(figure, share, (110, 16, 53, 66.5), title)
     # White is exactly a tenth of a cell: blue needs no registration, red does.

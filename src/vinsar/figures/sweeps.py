@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import config, radar
+from vinsar import config, radar, trajectory
 from vinsar.figures import style
 
 if TYPE_CHECKING:
@@ -145,10 +145,9 @@ def looks(study: config.Study, sweep: str) -> float:
         for name in ("radar", "scene", "imaging", "interferogram")
     )
     cell = radar.ground_resolution(
-        np.array([0.0, 0.0, radar_.rail_height_m]),
-        np.array((scene.x_min_m + scene.x_max_m) / 2),
-        np.array((scene.y_min_m + scene.y_max_m) / 2),
-        aperture_length_m=radar_.aperture_length_m,
+        trajectory.apertures(trajectory.planned(radar_))[0],
+        (scene.x_min_m + scene.x_max_m) / 2,
+        (scene.y_min_m + scene.y_max_m) / 2,
         frequency=np.array([radar_.start_frequency_hz, radar_.stop_frequency_hz]),
     )
     side = interferogram.coherence_window_px * imaging.grid_spacing_m
