@@ -76,16 +76,12 @@ def figure_configuration(*names):
 
 def figure_files(*names, caption):
     """The files of figures; the report shows the PNG."""
-    shown = dict(caption=caption, category="Figures")
     files = []
     for name in names:
-        stem = f"<results>/figures/{name}"
+        shown = dict(caption=caption, category="Figures", labels={"figure": name})
         for suffix in STUDY.figures.formats:
-            path = f"{stem}.{suffix}"
-            shows = suffix == "png"
-            files.append(
-                report(path, labels={"figure": name}, **shown) if shows else path
-            )
+            path = f"<results>/figures/{name}.{suffix}"
+            files += [report(path, **shown) if suffix == "png" else path]
     return files
 
 
