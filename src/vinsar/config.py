@@ -246,6 +246,30 @@ class Suppression(Section):
     gate_range_m: float = _key("slant range up to which the gate removes returns", "ours", gt=0)
 
 
+class Vehicle(Section):
+    """The vehicle's way during the scan, and what imaging is told of it."""
+
+    forward_speed_m_per_s: float = _key(
+        "constant speed ahead during the scan", "section 1, without a figure", ge=0, le=60
+    )
+    scan_duration_s: float = _key(
+        "time from the first antenna position to the last; only a moving vehicle feels it",
+        "section 1, without a figure",
+        gt=0,
+        le=60,
+    )
+    speed_correction: Literal["none", "exact", "sensor"] = _key(
+        "the speed that imaging is told: zero, the true one, or that of the speed sensor",
+        "section 1",
+    )
+    speed_error_m_per_s: float = _key(
+        "standard deviation of the sensor's error, normal and constant during a scan",
+        "not given",
+        ge=0,
+        le=60,
+    )
+
+
 class Imaging(Section):
     """Range compression and back-projection."""
 
@@ -443,6 +467,7 @@ class Study(Section):
     echo: Echo
     motion: Motion
     suppression: Suppression
+    vehicle: Vehicle
     imaging: Imaging
     interferogram: Interferogram
     filtering: Filtering

@@ -343,7 +343,7 @@ def add_coupling(
     received, echo
         Product ``echo`` with and without noise.
     trajectory
-        Product ``true_trajectory``.
+        Product ``trajectory``.
     coupling_db
         Power of the coupling over the mean power of the scene, both in a range-compressed
         resolution cell with uniform weighting, dB.

@@ -1,4 +1,8 @@
-"""Position errors of a shaking vehicle, and what they do to the focus (Fig. 5)."""
+"""The vehicle's motion during the scan, position errors, and what both do to the focus (Fig. 5).
+
+While the cart crosses the aperture at the speed ``u`` the vehicle drives ahead at ``v``: the
+positions lie on a line turned by the yaw angle ``atan(v / u)`` (section 1).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Floats = NDArray[np.floating]
 
@@ -100,18 +104,99 @@ def displace(
     return variables.dataset("trajectory", antennas, {"channel": trajectory["channel"].values})
 
 
-def point_gain(
-    truth: xr.Dataset,
-    recorded: xr.Dataset,
-    point: Floats,
-    frequency: Floats,
-    range_weights: Floats,
-    aperture_weights: Floats,
-) -> Floats:
-    """Return how much of a point target's image is left at its position, by channel.
+def slope(speed_m_per_s: ArrayLike, *, aperture_length_m: float, duration_s: float) -> Floats:
+    """Return how far the vehicle drives for each metre of the scan: the tangent of the yaw angle.
 
-    The exact matched filter of the recorded positions applied to the echo of the true ones:
-    ``|sum_l v_l sum_k w_k exp(4 pi i f_k (rho_recorded - rho_true) / c)|``, 1 without errors.
+    Parameters
+    ----------
+    speed_m_per_s
+        Speed ``v`` of the vehicle, m/s.
+    aperture_length_m, duration_s
+        Length of the aperture at rest, m, and time for it, s; ``u`` is their ratio.
+
+    Returns
+    -------
+    ndarray
+        ``v / u``, 1.
+    """
+    return np.asarray(speed_m_per_s) * duration_s / aperture_length_m
+
+
+def advance(trajectory: xr.Dataset, *, speed_m_per_s: float, duration_s: float) -> xr.Dataset:
+    """Let the vehicle drive ahead during the scan.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``; its positions are evenly spaced in time.
+    speed_m_per_s
+        Speed of the vehicle, constant and straight ahead, m/s.
+    duration_s
+        Time from the first position to the last, s. At half of it the vehicle is where it is in
+        ``trajectory``: the scene stays fixed to the ground.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory`` with other positions; the same where the speed is 0.
+    """
+    if speed_m_per_s == 0:
+        return trajectory
+    # ASSUME: The vehicle stands still during a frequency sweep and moves from sweep to sweep.
+    # ASSUME: Cart, switches and vehicle keep their speed during the scan.
+    time = duration_s * np.linspace(-0.5, 0.5, trajectory.sizes["position"])
+    way = speed_m_per_s * time[None, :, None] * (np.array(AXES) == "y")
+    antennas = {name: trajectory[name].values + way for name in ("transmitter", "receiver")}
+    return variables.dataset("trajectory", antennas, {"channel": trajectory["channel"].values})
+
+
+def imaged_place(
+    x: ArrayLike, y: ArrayLike, *, true_slope: float, told_slope: float
+) -> tuple[Floats, Floats]:
+    """Return where the image shows ground when imaging is told another speed.
+
+    From the position ``(s, k s)`` on an aperture of the slope ``k`` a point has the squared range
+    ``|p|^2 + (1 + k^2) s^2 - 2 s (x + k y)``. It is imaged where distance ``|p'|`` and
+    ``x' + k' y'`` of the slope ``k'`` that imaging is told are the same; what remains,
+    ``(k^2 - k'^2) s^2``, defocuses. Near broadside that is a turn by the error of the yaw angle.
+    The height is not touched: it comes from the difference of the two ranges alone.
+
+    Parameters
+    ----------
+    x, y
+        Ground points relative to the aperture's centre, m, of shapes that broadcast.
+    true_slope, told_slope
+        ``v / u`` of the true speed and of the one that imaging is told (`slope`).
+
+    Returns
+    -------
+    tuple of ndarray
+        x and y in the image, m, on the same side of the aperture; NaN where nothing fits.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    distance = np.hypot(x, y)
+    cosine = (x + true_slope * y) / (np.sqrt(1 + told_slope**2) * distance)
+    from_axis = np.arccos(np.where(np.abs(cosine) <= 1, cosine, np.nan))
+    side = np.where(y >= true_slope * x, 1.0, -1.0)
+    azimuth = np.arctan(told_slope) + side * from_axis
+    return distance * np.cos(azimuth), distance * np.sin(azimuth)
+
+
+def _half_path(antennas: xr.Dataset, point: Floats) -> Floats:
+    legs = [
+        np.linalg.norm(antennas[name].values - point, axis=-1)
+        for name in ("transmitter", "receiver")
+    ]
+    return np.asarray(legs[0] + legs[1]) / 2
+
+
+def peak_place(
+    truth: xr.Dataset, recorded: xr.Dataset, point: Floats, aperture_weights: Floats
+) -> Floats:
+    """Return where the image of a point target on the ground lies, by channel.
+
+    The ground point whose half paths from the recorded positions match those of the target from
+    the true ones best, by least squares over the aperture.
 
     Parameters
     ----------
@@ -119,6 +204,58 @@ def point_gain(
         Product ``trajectory``: where the antennas were, and where imaging takes them to be.
     point
         Position of the target (3,), m.
+    aperture_weights
+        Weights of the positions, of sum 1.
+
+    Returns
+    -------
+    ndarray, shape (channel, 3)
+        Places, m, at the target's height.
+    """
+    from scipy.optimize import least_squares
+
+    weight = np.sqrt(aperture_weights)
+    found = np.tile(point, (truth.sizes["channel"], 1))
+    for channel, path in enumerate(_half_path(truth, point)):
+        ends = [recorded[name].values[channel] for name in ("transmitter", "receiver")]
+
+        def miss(place: Floats, ends: list[Floats] = ends, path: Floats = path) -> Floats:
+            legs = [np.linalg.norm(end - [*place, point[2]], axis=-1) for end in ends]
+            return np.asarray(weight * ((legs[0] + legs[1]) / 2 - path))
+
+        def gradient(place: Floats, ends: list[Floats] = ends) -> Floats:
+            rays = [[*place, point[2]] - end for end in ends]
+            units = [ray / np.linalg.norm(ray, axis=-1)[:, None] for ray in rays]
+            return np.asarray(weight[:, None] * (units[0] + units[1])[:, :2] / 2)
+
+        found[channel, :2] = least_squares(miss, point[:2], jac=gradient, method="lm").x
+    return found
+
+
+def point_gain(
+    truth: xr.Dataset,
+    recorded: xr.Dataset,
+    point: Floats,
+    place: Floats,
+    frequency: Floats,
+    range_weights: Floats,
+    aperture_weights: Floats,
+) -> Floats:
+    """Return how much of a point target's image is found at a place, by channel.
+
+    The exact matched filter of the recorded positions applied to the echo of the true ones:
+    ``|sum_l v_l sum_k w_k exp(4 pi i f_k (rho_recorded - rho_true) / c)|``, 1 at the
+    target's own position without errors.
+
+    Parameters
+    ----------
+    truth, recorded
+        Product ``trajectory``: where the antennas were, and where imaging takes them to be.
+    point
+        Position of the target (3,), m.
+    place
+        Where the image is looked at, by channel (channel, 3), m: `peak_place`, or the target's
+        own position.
     frequency
         Evenly spaced frequencies, Hz.
     range_weights, aperture_weights
@@ -129,15 +266,7 @@ def point_gain(
     ndarray, shape (channel,)
         Amplitude relative to perfect focus.
     """
-
-    def half_path(antennas: xr.Dataset) -> Floats:
-        legs = [
-            np.linalg.norm(antennas[name].values - point, axis=-1)
-            for name in ("transmitter", "receiver")
-        ]
-        return np.asarray(legs[0] + legs[1]) / 2
-
-    delay = 2 * (half_path(recorded) - half_path(truth)) / SPEED_OF_LIGHT
+    delay = 2 * (_half_path(recorded, place[:, None]) - _half_path(truth, point)) / SPEED_OF_LIGHT
     # The frequencies are evenly spaced: the sum over them is a polynomial of the step's phase.
     step = np.exp(2j * np.pi * delay * (frequency[1] - frequency[0]))
     profile = polynomial.polyval(step, range_weights) * np.exp(2j * np.pi * delay * frequency[0])

@@ -47,7 +47,7 @@ logger = logging.getLogger(__name__)
 Products = dict[str, "xr.Dataset"]
 
 # What a random draw is for; the number is part of its seed and never changes.
-_JITTER, _NOISE, _MOTION, _BASELINE, _ROUGHNESS, _COUPLING = 0, 1, 2, 3, 4, 5
+_JITTER, _NOISE, _MOTION, _BASELINE, _ROUGHNESS, _COUPLING, _SPEED = 0, 1, 2, 3, 4, 5, 6
 
 # Slant range by which the profiles exceed the image: position errors shall not need new ones.
 _PROFILE_MARGIN_M = 0.5
@@ -127,11 +127,31 @@ def _displaced(products: Products, study: config.Study, affected: str) -> xr.Dat
 
 
 def _true_trajectory(products: Products, study: config.Study) -> xr.Dataset:
-    return _displaced(products, study, "true")
+    return motion.advance(
+        _displaced(products, study, "true"),
+        speed_m_per_s=study.vehicle.forward_speed_m_per_s,
+        duration_s=study.vehicle.scan_duration_s,
+    )
+
+
+def _told_speed(study: config.Study) -> float:
+    """Return the speed that imaging is told, m/s."""
+    options = study.vehicle
+    if options.speed_correction == "none":
+        return 0.0
+    if options.speed_correction == "exact":
+        return options.forward_speed_m_per_s
+    # One draw a realization, whatever the speed and the error's size.
+    error = options.speed_error_m_per_s * _rng(study, _SPEED).standard_normal()
+    return options.forward_speed_m_per_s + float(error)
 
 
 def _recorded_trajectory(products: Products, study: config.Study) -> xr.Dataset:
-    return _displaced(products, study, "recorded")
+    return motion.advance(
+        _displaced(products, study, "recorded"),
+        speed_m_per_s=_told_speed(study),
+        duration_s=study.vehicle.scan_duration_s,
+    )
 
 
 def _terrain(products: Products, study: config.Study) -> xr.Dataset:
@@ -174,7 +194,7 @@ def _visibility(products: Products, study: config.Study) -> xr.Dataset:
 
 def _truth(products: Products, study: config.Study) -> xr.Dataset:
     x, y = image_axes(study.imaging)
-    return visibility.truth_on_grid(products["terrain"], products["trajectory"], x, y)
+    return visibility.truth_on_grid(products["terrain"], products["true_trajectory"], x, y)
 
 
 def _echo(products: Products, study: config.Study) -> xr.Dataset:
@@ -193,7 +213,9 @@ def _received(products: Products, study: config.Study) -> xr.Dataset:
     clean, options = products["echo"], study.echo
     if options.snr_db is None and options.coupling_db is None:
         return clean
-    facets, antennas = products["facets"], products["true_trajectory"]
+    # The antennas at rest: over a whole scan a vehicle in motion sees a wider swath than from any
+    # one place, and motion leaves a transmitter's distance from its receiver as it is.
+    facets, antennas = products["facets"], products["trajectory"]
     near, far = trajectory.range_extent(
         antennas, *_facet_extent(facets), facets["facet_position"].values[:, 2]
     )
@@ -225,7 +247,12 @@ def _facet_extent(facets: xr.Dataset) -> tuple[Floats, Floats]:
 
 
 def _profiles(products: Products, study: config.Study) -> xr.Dataset:
-    near, far = trajectory.range_extent(products["trajectory"], *image_axes(study.imaging))
+    antennas = motion.advance(
+        products["trajectory"],
+        speed_m_per_s=_told_speed(study),
+        duration_s=study.vehicle.scan_duration_s,
+    )
+    near, far = trajectory.range_extent(antennas, *image_axes(study.imaging))
     return imaging.compress(
         suppression.suppress(products["received"], **study.suppression.model_dump()),
         near_range_m=max(0.0, near - _PROFILE_MARGIN_M),
@@ -318,15 +345,29 @@ def _focus(products: Products, study: config.Study) -> xr.Dataset:
     truth, recorded = products["true_trajectory"], products["recorded_trajectory"]
     frequency = _frequency(study)
     x, y = image_axes(study.imaging)
-    gain = motion.point_gain(
-        truth,
-        recorded,
-        np.array([(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2, 0.0]),
-        frequency,
-        radar.window(study.imaging.range_window, frequency.size),
-        radar.window(study.imaging.aperture_window, truth.sizes["position"]),
+    target = np.array([(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2, 0.0])
+    aperture_weights = radar.window(study.imaging.aperture_window, truth.sizes["position"])
+    peak = motion.peak_place(truth, recorded, target, aperture_weights)
+
+    def gain(place: Floats) -> Floats:
+        return motion.point_gain(
+            truth,
+            recorded,
+            target,
+            place,
+            frequency,
+            radar.window(study.imaging.range_window, frequency.size),
+            aperture_weights,
+        )
+
+    return variables.dataset(
+        "focus",
+        {
+            "point_gain": gain(np.tile(target, (len(peak), 1))),
+            "peak_gain": gain(peak),
+            "peak_shift": (peak - target)[:, :2],
+        },
     )
-    return variables.dataset("focus", {"point_gain": gain})
 
 
 def _baseline_angle(products: Products, study: config.Study) -> xr.Dataset:
@@ -413,7 +454,16 @@ STAGES: dict[str, Stage] = {
     ),
     "trajectory": Stage(_trajectory, (), _ANTENNAS, ("trajectory",)),
     "true_trajectory": Stage(
-        _true_trajectory, ("trajectory",), (*_DRAWS, *_WAVEFORM, "motion"), ("motion", "radar")
+        _true_trajectory,
+        ("trajectory",),
+        (
+            *_DRAWS,
+            *_WAVEFORM,
+            "motion",
+            "vehicle.forward_speed_m_per_s",
+            "vehicle.scan_duration_s",
+        ),
+        ("motion", "radar"),
     ),
     "visibility": Stage(
         _visibility,
@@ -422,7 +472,7 @@ STAGES: dict[str, Stage] = {
         ("visibility",),
         by_channel=True,
     ),
-    "truth": Stage(_truth, ("terrain", "trajectory"), _GRID, ("visibility",)),
+    "truth": Stage(_truth, ("terrain", "true_trajectory"), _GRID, ("visibility",)),
     "echo": Stage(
         _echo,
         ("facets", "true_trajectory", "visibility"),
@@ -438,7 +488,7 @@ STAGES: dict[str, Stage] = {
     ),
     "received": Stage(
         _received,
-        ("echo", "facets", "true_trajectory"),
+        ("echo", "facets", "trajectory"),
         (
             *_DRAWS,
             "echo.snr_db",
@@ -452,16 +502,21 @@ STAGES: dict[str, Stage] = {
         _profiles,
         ("received", "trajectory"),
         (
+            *_DRAWS,
             *_GRID,
+            "vehicle",
             "suppression",
             "imaging.range_window",
             "imaging.oversampling",
             "imaging.interpolation",
         ),
-        ("suppression", "imaging", "trajectory"),
+        ("suppression", "imaging", "trajectory", "motion"),
     ),
     "recorded_trajectory": Stage(
-        _recorded_trajectory, ("trajectory",), (*_DRAWS, *_WAVEFORM, "motion"), ("motion", "radar")
+        _recorded_trajectory,
+        ("trajectory",),
+        (*_DRAWS, *_WAVEFORM, "motion", "vehicle"),
+        ("motion", "radar"),
     ),
     "images": Stage(
         _images,

@@ -53,7 +53,7 @@ _SMALL_BYTES = 1 << 16
 
 _RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
 _STATISTICS = tuple(name for name, own in variables.SWEEP.items() if own.dims == ("region",))
-_UNITS = {"m": "m", "hz": "Hz", "db": "dB", "deg": "degree"}
+_UNITS = {"m_per_s": "m s-1", "m": "m", "s": "s", "hz": "Hz", "db": "dB", "deg": "degree"}
 
 
 class SweepError(RuntimeError):
@@ -374,7 +374,7 @@ def run_case(case: Case, memo: Memo | None = None) -> Row:
     -------
     dict
         The statistics by region, the median coherence on visible ground, the residues, and the
-        point gain by channel, in plain numbers.
+        focus by channel, in plain numbers.
     """
     memo = memo or _MEMO
     with blocks.serially():
@@ -384,7 +384,7 @@ def run_case(case: Case, memo: Memo | None = None) -> Row:
     visible = ~truth["shadow"].values
     row["coherence"] = float(np.median(interferogram["coherence"].values[visible]))
     row["residues"] = int(np.abs(unwrapped["residue"].values).sum())
-    row["point_gain"] = focus["point_gain"].values.tolist()
+    row |= {str(name): values.values.tolist() for name, values in focus.data_vars.items()}
     return row
 
 
@@ -491,7 +491,7 @@ def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Ro
         data[name] = values.astype(int) if name == "residues" else values
     swept = {}
     for key, listed in sweep.over.items():
-        unit = _UNITS.get(key.rpartition("_")[2], "1")
+        unit = next((unit for end, unit in _UNITS.items() if key.endswith(f"_{end}")), "1")
         numeric = all(_is_number(value) for value in listed)
         attrs = {"long_name": key} | ({"units": unit} if numeric else {})
         texts = [value if isinstance(value, str) else _text(value) for value in listed]

@@ -562,14 +562,31 @@ def _ahead(radar: config.Radar, scene: config.Scene, imaging: config.Imaging) ->
             )
 
 
+def _drives_short(
+    radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
+) -> Iterator[Fault]:
+    speed, duration = vehicle.forward_speed_m_per_s, vehicle.scan_duration_s
+    foremost = max(0.0, float(_Derived.of(radar).upper[1])) + scene.facet_size_m
+    room = min(scene.y_min_m, imaging.y_min_m) - foremost
+    if 0 < room < speed * duration / 2:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            f"must be at most {2 * room / duration:.3g} m/s, or vehicle.scan_duration_s at most "
+            f"{2 * room / speed:.3g} s: the vehicle drives {speed * duration / 2:.3g} m from the "
+            "middle of the scan to its end, into scene or image",
+        )
+
+
 def _unambiguous(
-    radar: config.Radar, scene: config.Scene, imaging: config.Imaging
+    radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
 ) -> Iterator[Fault]:
     derived = _Derived.of(radar)
     half = radar.aperture_length_m / 2
+    behind = vehicle.forward_speed_m_per_s * vehicle.scan_duration_s / 2
     for name, part in (("scene", scene), ("imaging", imaging)):
         lateral = max(abs(part.x_min_m), abs(part.x_max_m)) + half
-        far = float(np.hypot(np.hypot(lateral, part.y_max_m), derived.upper[2]))
+        far = float(np.hypot(np.hypot(lateral, part.y_max_m + behind), derived.upper[2]))
         if far > derived.unambiguous_range:
             count = int(np.ceil((radar.frequency_count - 1) * far / derived.unambiguous_range)) + 1
             yield Fault(
@@ -712,6 +729,22 @@ def _baseline_short(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]
         )
 
 
+def _sides_apart(
+    radar: config.Radar, imaging: config.Imaging, vehicle: config.Vehicle
+) -> Iterator[Fault]:
+    # Corner of the image that the turning axis meets first.
+    most = imaging.y_min_m / imaging.x_max_m if imaging.x_max_m > 0 else np.inf
+    speed = vehicle.forward_speed_m_per_s
+    if speed * vehicle.scan_duration_s / radar.aperture_length_m > most:
+        limit = most * radar.aperture_length_m / vehicle.scan_duration_s
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            f"turns the aperture until its axis points into the image, and ground on both sides of "
+            f"the axis is imaged upon each other: this scan is unambiguous up to {limit:.3g} m/s",
+        )
+
+
 def _facets_coarse(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
     derived = _Derived.of(radar)
     if scene.facet_size_m < derived.wavelength:
@@ -765,6 +798,7 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _odd_windows,
     _reference_in_image,
     _object_heights,
+    _drives_short,
     _unambiguous,
     _facets_fine,
     _grid_fine,
@@ -772,4 +806,10 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _gate_before_image,
     _targets_imaged,
 )
-_UNWISE: tuple[Rule, ...] = (_baseline_short, _facets_coarse, _coupling_in_gate, _image_in_scene)
+_UNWISE: tuple[Rule, ...] = (
+    _baseline_short,
+    _facets_coarse,
+    _coupling_in_gate,
+    _image_in_scene,
+    _sides_apart,
+)

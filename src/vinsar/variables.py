@@ -231,6 +231,19 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
             "1",
             "amplitude of a point target at the image's centre relative to perfect focus",
         ),
+        "peak_gain": Variable(
+            ("channel",),
+            "real",
+            "1",
+            "amplitude of the point target where its image lies, relative to perfect focus",
+        ),
+        "peak_shift": Variable(
+            ("channel", "ground_axis"),
+            "real",
+            "m",
+            "displacement of the point target's image from its position",
+            "by the least-squares match of the ranges",
+        ),
     },
     "accuracy": {
         "height_error": Variable(_GRID, "real", "m", "height error, reconstructed minus true"),
@@ -353,7 +366,7 @@ SWEEP: dict[str, Variable] = {
 } | {
     "coherence": Variable((), "real", "1", "median coherence on visible ground"),
     "residues": Variable((), "integer", "1", "residues of the filtered phase"),
-    "point_gain": PRODUCTS["focus"]["point_gain"],
+    **PRODUCTS["focus"],
 }
 """Variables of a sweep; the dimensions of the swept keys and of the realization come first."""
 
@@ -463,6 +476,7 @@ def sweep_dataset(
         "realization": np.arange(result.sizes["realization"]),
         "region": np.array(REGIONS),
         "channel": np.array(CHANNELS),
+        "ground_axis": np.array(LABELS["ground_axis"]),
     }
     for name, labels in coords.items():
         result = result.assign_coords({name: (name, labels, COORDINATES[name].attrs)})

@@ -92,8 +92,8 @@ def make_sweep(
     std = std * rng.uniform(0.9, 1.1, shape)
     data: dict[str, Any] = {}
     for name, variable in variables.SWEEP.items():
-        one = std if name not in {"coherence", "point_gain"} else 1 / (1 + 20 * std)
-        trailing = {"region": (1.0, 0.4, 2.0), "channel": (1.0, 0.9)}
+        one = std if name not in {"coherence", "point_gain", "peak_gain"} else 1 / (1 + 20 * std)
+        trailing = {"region": (1.0, 0.4, 2.0), "channel": (1.0, 0.9), "ground_axis": (1.0, 0.1)}
         for dim in variable.dims:
             one = one[..., None] * np.asarray(trailing[dim])
         data[name] = one.astype(int) if name == "residues" else one

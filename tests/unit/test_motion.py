@@ -1,5 +1,8 @@
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.special import fresnel
 
 from vinsar import config, echo, imaging, motion, pipeline, radar, trajectory, variables
 from vinsar.constants import SPEED_OF_LIGHT
@@ -83,6 +86,12 @@ def test_transmitter_and_receiver_move_alike_along_one_axis(bistatic, axis):
         assert np.abs(np.delete(shift, number, axis=-1)).max() == 0
 
 
+STANDING = {
+    "forward_speed_m_per_s": 0.0, "scan_duration_s": 0.5, "speed_correction": "none",
+    "speed_error_m_per_s": 0.0,
+}  # fmt: skip
+
+
 def errors_of(rail, affected="recorded", seed=1, realization=0, **options):
     """The errors that a study draws, by channel and position, m."""
     section = {
@@ -91,7 +100,7 @@ def errors_of(rail, affected="recorded", seed=1, realization=0, **options):
     } | options  # fmt: skip
     study = config.Study.part(
         {
-            "seed": seed, "realization": realization, "motion": section,
+            "seed": seed, "realization": realization, "motion": section, "vehicle": STANDING,
             "radar.start_frequency_hz": 13e9, "radar.stop_frequency_hz": 15e9,
             "radar.frequency_count": 101,
         }
@@ -166,11 +175,12 @@ def test_true_and_recorded_errors_have_opposite_effects_to_first_order(
     np.testing.assert_allclose(np.angle(from_path), -theory, atol=0.003)
 
 
-def gain(truth, recorded, frequency=FREQUENCY):
+def gain(truth, recorded, frequency=FREQUENCY, place=None):
     return motion.point_gain(
         truth,
         recorded,
         POINT,
+        np.tile(POINT, (2, 1)) if place is None else place,
         frequency,
         np.full(frequency.size, 1 / frequency.size),
         np.full(81, 1 / 81),
@@ -198,7 +208,7 @@ def test_the_point_gain_is_that_of_the_direct_sum(bistatic):
     turn = 2j * np.pi * FREQUENCY / SPEED_OF_LIGHT
     terms = np.exp(turn * (path(moved) - path(bistatic))[..., None])
     direct = np.abs(np.einsum("clk,k,l->c", terms, *weights))
-    found = motion.point_gain(bistatic, moved, POINT, FREQUENCY, *weights)
+    found = motion.point_gain(bistatic, moved, POINT, np.tile(POINT, (2, 1)), FREQUENCY, *weights)
     np.testing.assert_allclose(found, direct, rtol=1e-10)
     assert found.max() < 0.5
 
@@ -235,6 +245,136 @@ def test_the_point_gain_follows_the_characteristic_function(rail, distribution, 
     # The direction differs by 0.3 % between the antennas and over the aperture.
     expected = mean**2 + (1 - mean**2) / 81
     assert power.mean() == pytest.approx(expected, abs=5 * spread + 0.006 * phase**2 * expected)
+
+
+@pytest.mark.parametrize(("speed", "duration"), [(1.0, 0.5), (10.0, 0.5), (10.0, 0.005)])
+def test_the_aperture_turns_by_the_yaw_angle_about_its_centre(bistatic, speed, duration):
+    moved = motion.advance(bistatic, speed_m_per_s=speed, duration_s=duration)
+    yaw = np.arctan2(speed, 0.8 / duration)
+    for name in ("transmitter", "receiver"):
+        way = moved[name].values - bistatic[name].values
+        assert np.abs(way[..., [0, 2]]).max() == 0
+        np.testing.assert_allclose(way.mean(axis=1), 0, atol=1e-12)
+        axis = moved[name].values[:, -1] - moved[name].values[:, 0]
+        np.testing.assert_allclose(np.arctan2(axis[:, 1], axis[:, 0]), yaw)
+        steps = np.diff(moved[name].values, axis=1)
+        np.testing.assert_allclose(steps, np.broadcast_to(axis[:, None] / 80, steps.shape))
+    assert motion.slope(speed, aperture_length_m=0.8, duration_s=duration) == pytest.approx(
+        np.tan(yaw)
+    )
+
+
+STILL = {
+    "axis": "y", "level_wavelengths": 0.0, "distribution": "uniform", "channels": "common",
+    "spectrum": "white", "cycles_per_aperture": 2.0, "affects": "recorded",
+}  # fmt: skip
+SCAN = STANDING | {"forward_speed_m_per_s": 4.0}
+
+
+def driven(rail, name, section=STILL, realization=0, **options):
+    """Way ahead of the antennas in one of the trajectories of a study, (channel, position), m."""
+    study = config.Study.part(
+        {
+            "seed": 1, "realization": realization, "motion": section, "vehicle": SCAN | options,
+            "radar.start_frequency_hz": 13e9, "radar.stop_frequency_hz": 15e9,
+            "radar.frequency_count": 101,
+        }
+    )  # fmt: skip
+    product = pipeline.STAGES[f"{name}_trajectory"].compute({"trajectory": rail}, study)
+    return (product["transmitter"] - rail["transmitter"]).values[..., 1]
+
+
+def test_the_truth_drives_and_the_record_has_what_imaging_is_told(rail):
+    way = 4.0 * 0.5 * np.linspace(-0.5, 0.5, 81)
+    for correction, told in (("none", 0.0), ("exact", 1.0), ("sensor", 1.0)):
+        np.testing.assert_allclose(
+            driven(rail, "true", speed_correction=correction), np.tile(way, (2, 1)), atol=1e-15
+        )
+        np.testing.assert_allclose(
+            driven(rail, "recorded", speed_correction=correction),
+            np.tile(told * way, (2, 1)),
+            atol=1e-15,
+        )
+
+
+def test_the_sensor_s_error_is_one_draw_a_realization_that_scales(rail):
+    def told(realization=0, **options):
+        way = driven(
+            rail, "recorded", realization=realization, speed_correction="sensor", **options
+        )
+        return (way[0, -1] - way[0, 0]) / 0.5
+
+    errors = np.array([told(n, speed_error_m_per_s=0.3) - 4.0 for n in range(400)])
+    assert errors.mean() == pytest.approx(0, abs=5 * 0.3 / np.sqrt(400))
+    assert errors.std() == pytest.approx(0.3, rel=5 / np.sqrt(2 * 400))
+    assert told(7, speed_error_m_per_s=0.6) - 4.0 == pytest.approx(2 * errors[7])
+    faster = told(7, speed_error_m_per_s=0.3, forward_speed_m_per_s=9.0)
+    assert faster - 9.0 == pytest.approx(errors[7])
+
+
+def test_position_errors_add_to_the_way_of_the_vehicle(rail):
+    for affected in ("true", "recorded"):
+        shaken = STILL | {"level_wavelengths": 0.5, "affects": affected}
+        found = driven(rail, affected, shaken, speed_correction="exact")
+        way = driven(rail, affected, speed_correction="exact")
+        np.testing.assert_allclose(
+            found - way, errors_of(rail, affected, affects=affected, level_wavelengths=0.5)
+        )
+
+
+@given(
+    x=st.floats(-8, 8), y=st.floats(-20, 20).filter(lambda y: abs(y) > 1),
+    true=st.floats(0, 8), told=st.floats(0, 8),
+)  # fmt: skip
+def test_the_image_keeps_distance_side_and_place_along_the_axis(x, y, true, told):
+    assume(abs(y - true * x) > 0.01)
+    found_x, found_y = motion.imaged_place(x, y, true_slope=true, told_slope=told)
+    reach = abs(x + true * y) / np.hypot(1, told) - np.hypot(x, y)
+    if np.isnan(found_x):
+        assert reach > -1e-9
+        return
+    assert np.hypot(found_x, found_y) == pytest.approx(np.hypot(x, y))
+    assert found_x + told * found_y == pytest.approx(x + true * y, abs=1e-9)
+    assert (found_y - told * found_x) * (y - true * x) > -1e-6
+    same = motion.imaged_place(x, y, true_slope=true, told_slope=true)
+    np.testing.assert_allclose(same, (x, y), atol=1e-6)
+
+
+ALIKE = np.full(81, 1 / 81)
+
+
+@pytest.mark.parametrize(("true", "told"), [(0.3, 0.0), (0.0, 0.3), (3.0, 3.01), (0.05, 0.02)])
+def test_the_ranges_match_best_where_theory_has_the_image(rail, true, told):
+    truth, recorded = (
+        motion.advance(rail, speed_m_per_s=slope * 1.6, duration_s=0.5) for slope in (true, told)
+    )
+    place = motion.peak_place(truth, recorded, POINT, ALIKE)
+    theory = motion.imaged_place(*POINT[:2], true_slope=true, told_slope=told)
+    # Left over is (k^2 - k'^2) s^2 / 2r over s = -a..a: a mean, which moves the range, and, as r
+    # changes with s by s (x + k y) / r, a cubic, whose slope 3/5 a^2 moves the azimuth.
+    rest = abs(true**2 - told**2) * 0.4**2 / (2 * 13.2)
+    rest *= 1 / 3 + 3 / 5 * (POINT[0] + true * POINT[1]) / 13.2
+    np.testing.assert_allclose(place[:, :2], np.tile(theory, (2, 1)), atol=2 * rest)
+    assert np.hypot(*(theory - POINT[:2])) > 50 * rest
+
+
+@pytest.mark.parametrize(("true", "told"), [(0.5, 0.0), (0.9, 0.0), (3.0, 3.1)])
+def test_a_wrong_speed_defocuses_by_the_quadratic_rest(rail, true, told):
+    carrier = radar.carrier(FREQUENCY)
+    narrow = radar.frequencies(carrier - 1e6, carrier + 1e6, 3)
+    truth, recorded = (
+        motion.advance(rail, speed_m_per_s=slope * 1.6, duration_s=0.5) for slope in (true, told)
+    )
+    place = motion.peak_place(truth, recorded, POINT, ALIKE)
+    # pi L^2 (k^2 - k'^2) / (2 lambda r) at the ends of the aperture; a Fresnel integral over it.
+    edge = np.pi * 0.8**2 * abs(true**2 - told**2) / (2 * WAVELENGTH * np.hypot(13.0, 2.15))
+    at = np.sqrt(2 * edge / np.pi)
+    sine, cosine = fresnel(at)
+    # Between the antennas and over the aperture the range differs by a few percent.
+    expected = np.hypot(sine, cosine) / at
+    found = gain(truth, recorded, narrow, place)
+    np.testing.assert_allclose(found, expected, atol=0.05 * (1 - expected) + 0.002)
+    assert gain(truth, recorded, narrow).max() < 0.3 < found.min()
 
 
 def test_the_margin_of_the_profiles_covers_the_errors_or_says_so(rail):

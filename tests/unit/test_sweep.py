@@ -74,13 +74,16 @@ def test_swept_keys_are_dimensions_with_values_and_units(tiny, swept):
     found = run(lengths)
     assert found["radar_baseline_m"].attrs["units"] == "m"
     assert found["radar_baseline_angle_deg"].attrs["units"] == "degree"
+    found = run(with_sweep(tiny, {"vehicle.forward_speed_m_per_s": [0.0, 1.0]}))
+    assert found["vehicle_forward_speed_m_per_s"].attrs["units"] == "m s-1"
 
 
 def test_every_statistic_is_there_with_its_unit(swept, tiny):
     accuracy = pipeline.run(tiny, only="accuracy")["accuracy"]
     of_regions = {str(name) for name in accuracy.data_vars if accuracy[name].dims == ("region",)}
     assert of_regions - {"cell_count"} == STATISTICS
-    assert set(swept.data_vars) == STATISTICS | {"coherence", "residues", "point_gain"}
+    focus = {"point_gain", "peak_gain", "peak_shift"}
+    assert set(swept.data_vars) == STATISTICS | {"coherence", "residues"} | focus
     for name in STATISTICS:
         assert swept[name].attrs == accuracy[name].attrs
 
@@ -115,7 +118,8 @@ def test_each_case_is_the_study_of_its_keys_and_realization(tiny, swept):
         coherence = products["interferogram"]["coherence"].values[visible]
         assert float(case["coherence"]) == float(np.median(coherence))
         assert int(case["residues"]) == np.abs(products["unwrapped"]["residue"]).sum()
-        np.testing.assert_array_equal(case["point_gain"], products["focus"]["point_gain"])
+        for name, values in products["focus"].data_vars.items():
+            np.testing.assert_array_equal(case[name], values, err_msg=name)
 
 
 def test_a_sweep_is_stored_and_read_as_it_is(swept, tmp_path):
@@ -176,8 +180,24 @@ def test_values_that_are_no_numbers_become_text(tiny):
         ),
         (
             {"motion.level_wavelengths": [0.1, 0.2], "motion.affects": ["true"]},
-            ("terrain", "facets", "truth"),
-            ("visibility/lower", "echo/lower", "images/lower", "focus"),
+            ("terrain", "facets"),
+            ("visibility/lower", "truth", "echo/lower", "images/lower", "focus"),
+            2,
+        ),
+        (
+            {"vehicle.forward_speed_m_per_s": [0.0, 1.0], "vehicle.speed_correction": ["none"]},
+            ("terrain", "facets", "trajectory"),
+            ("visibility/lower", "truth", "echo/lower", "focus"),
+            2,
+        ),
+        # What imaging is told changes nothing of what there is.
+        (
+            {
+                "vehicle.forward_speed_m_per_s": [2.0],
+                "vehicle.speed_correction": ["none", "exact"],
+            },
+            ("true_trajectory", "visibility/lower", "truth", "echo/upper"),
+            ("recorded_trajectory", "images/lower", "focus"),
             2,
         ),
         ({"accuracy.tolerance_m": [0.05, 0.1]}, ("dem",), ("accuracy",), 2),

@@ -173,6 +173,38 @@ def test_what_is_unwise_is_said_and_allowed(change, says):
     assert says in sentence
 
 
+MOVING = {
+    "forward_speed_m_per_s": 10.0, "scan_duration_s": 0.1, "speed_correction": "exact",
+    "speed_error_m_per_s": 0.0,
+}  # fmt: skip
+
+
+def test_a_vehicle_that_reaches_the_scene_before_the_scan_ends_is_refused():
+    raw = changed(vehicle=MOVING | {"scan_duration_s": 2.5})
+    says = faults(raw)["vehicle.forward_speed_m_per_s"]
+    # 10 m to the scene less a facet, in half of 2.5 s.
+    assert "at most 7.98 m/s" in says
+    assert "vehicle.scan_duration_s at most 1.99 s" in says
+    assert "drives 12.5 m" in says
+    validation.check(changed(vehicle=MOVING | {"scan_duration_s": 1.99}))
+
+
+def test_the_way_of_the_vehicle_counts_for_the_unambiguous_range():
+    # 16.5 m at rest, of 18.7 m; from the first position, 5 m behind, hypot(21, 2.9, 2.3).
+    assert validation.check(changed(radar__frequency_count=251, vehicle=MOVING))
+    vehicle = MOVING | {"scan_duration_s": 1.0}
+    assert "21.32" in faults(changed(radar__frequency_count=251, vehicle=vehicle))["scene.y_max_m"]
+
+
+def test_an_aperture_that_points_into_the_image_is_advised_against():
+    vehicle = MOVING | {"scan_duration_s": 0.5}
+    (sentence,) = validation.advice(validation.check(changed(vehicle=vehicle)))
+    # y / x = 10 / 2.5 in the near right corner, at a cart speed of 1.6 m/s.
+    assert "unambiguous up to 6.4 m/s" in sentence
+    vehicle |= {"forward_speed_m_per_s": 6.3}
+    assert validation.advice(validation.check(changed(vehicle=vehicle))) == []
+
+
 def test_files_override_in_order(tmp_path):
     first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
     first.write_text("seed: 1\nradar: {baseline_m: 0.4, rail_height_m: 2.5}\n")

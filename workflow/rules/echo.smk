@@ -24,7 +24,7 @@ rule received:
     input:
         echo="<results>/echo.nc",
         facets="<results>/facets.nc",
-        true_trajectory="<results>/true_trajectory.nc",
+        trajectory="<results>/trajectory.nc",
         code=stage_sources("received"),
     output:
         "<results>/received.nc",

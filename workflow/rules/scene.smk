@@ -101,7 +101,7 @@ rule visibility:
 rule truth:
     input:
         terrain="<results>/terrain.nc",
-        trajectory="<results>/trajectory.nc",
+        true_trajectory="<results>/true_trajectory.nc",
         code=stage_sources("truth"),
     output:
         "<results>/truth.nc",
