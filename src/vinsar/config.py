@@ -132,7 +132,24 @@ SceneObject = Annotated[Box | Stump | Mound | Ditch | Pit, Field(discriminator="
 class Scene(Section):
     """The true terrain: for the simulated echo and the metrics, never for the processing."""
 
-    terrain: Literal["peaks", "flat"] = _key("shape of the terrain", "section 2")
+    terrain: Literal["peaks", "flat", "file"] = _key(
+        "shape of the terrain; `file` is your own (docs/own-data.md)", "section 2"
+    )
+    file: str | None = _key(
+        "netCDF or GeoTIFF file with the heights of the terrain `file`; paths begin in the "
+        "repository's folder",
+        "ours",
+    )
+    origin_easting_m: float = _key("easting (x) of the vehicle in the file", "ours")
+    origin_northing_m: float = _key("northing (y) of the vehicle in the file", "ours")
+    heading_deg: float = _key(
+        "direction ahead, clockwise from the file's y axis (grid north)", "ours", ge=-360, le=360
+    )
+    ground_height_m: float | None = _key(
+        "height in the file that becomes 0, the ground plane; null for the file's own height at "
+        "the vehicle",
+        "ours",
+    )
     peak_height_m: float = _key("height of the highest top of `peaks`", "section 2", gt=0)
     x_min_m: float = _key("left edge", "section 2")
     x_max_m: float = _key("right edge", "section 2")
@@ -162,6 +179,16 @@ class Scene(Section):
     )
     patches: Annotated[tuple[Patch, ...], Field(strict=False)] = _key(
         "ground of another reflectivity, without height", "section 1, without a figure"
+    )
+
+
+class Measurement(Section):
+    """Echoes of your own in place of simulated ones (docs/own-data.md)."""
+
+    file: str | None = _key(
+        "netCDF file of measured echoes; paths begin in the repository's folder. The section "
+        "`radar` then comes from the file; `scene`, `echo` and `motion` mean nothing",
+        "ours",
     )
 
 
@@ -420,6 +447,26 @@ class Outputs(Section):
     claims: bool = _key("hold the study against the paper's claims", "ours")
 
 
+ELEVATION = (
+    "terrain",
+    "file",
+    "origin_easting_m",
+    "origin_northing_m",
+    "heading_deg",
+    "ground_height_m",
+    "x_min_m",
+    "x_max_m",
+    "y_min_m",
+    "y_max_m",
+    "terrain_spacing_m",
+    "reflectivity_offset",
+)
+"""Keys of `Scene` that decide what is read from the file of a terrain."""
+
+SIMULATION = ("scene", "echo", "vehicle", "motion")
+"""Sections that mean nothing to measured echoes."""
+
+
 Override = dict[str, Any]
 
 
@@ -464,6 +511,7 @@ class Study(Section):
     realization: int = _key("number of the realization of everything random", "ours", ge=0)
     radar: Radar
     scene: Scene
+    measurement: Measurement
     echo: Echo
     motion: Motion
     suppression: Suppression

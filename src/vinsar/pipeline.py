@@ -73,6 +73,8 @@ class Stage:
         Modules whose code it runs, without those that they import.
     by_channel
         Whether each channel is computed from its own part of the inputs alone.
+    optional
+        Products that it reads if the study has them.
     """
 
     compute: Callable[[Products, config.Study], xr.Dataset]
@@ -80,6 +82,7 @@ class Stage:
     sections: tuple[str, ...]
     modules: tuple[str, ...]
     by_channel: bool = False
+    optional: tuple[str, ...] = ()
 
 
 def _rng(study: config.Study, *purpose: int) -> np.random.Generator:
@@ -155,23 +158,26 @@ def _recorded_trajectory(products: Products, study: config.Study) -> xr.Dataset:
 
 
 def _terrain(products: Products, study: config.Study) -> xr.Dataset:
-    del products
-    ground = scene.terrain(
-        study.scene.terrain,
-        x_min_m=study.scene.x_min_m,
-        x_max_m=study.scene.x_max_m,
-        y_min_m=study.scene.y_min_m,
-        y_max_m=study.scene.y_max_m,
-        spacing_m=study.scene.terrain_spacing_m,
-        peak_height_m=study.scene.peak_height_m,
-        reflectivity_offset=study.scene.reflectivity_offset,
-    )
+    options = study.scene
+    if options.terrain == "file":
+        ground = products["elevation"]
+    else:
+        ground = scene.terrain(
+            options.terrain,
+            x_min_m=options.x_min_m,
+            x_max_m=options.x_max_m,
+            y_min_m=options.y_min_m,
+            y_max_m=options.y_max_m,
+            spacing_m=options.terrain_spacing_m,
+            peak_height_m=options.peak_height_m,
+            reflectivity_offset=options.reflectivity_offset,
+        )
     return scene.furnish(
         ground,
-        objects=study.scene.objects,
-        patches=study.scene.patches,
-        roughness_std_m=study.scene.roughness_std_m,
-        roughness_correlation_m=study.scene.roughness_correlation_m,
+        objects=options.objects,
+        patches=options.patches,
+        roughness_std_m=options.roughness_std_m,
+        roughness_correlation_m=options.roughness_correlation_m,
         rng=_rng(study, _ROUGHNESS),
     )
 
@@ -445,7 +451,7 @@ _GRID = (
 )
 
 STAGES: dict[str, Stage] = {
-    "terrain": Stage(_terrain, (), (*_DRAWS, "scene"), ("scene",)),
+    "terrain": Stage(_terrain, (), (*_DRAWS, "scene"), ("scene",), optional=("elevation",)),
     "facets": Stage(
         _facets,
         ("terrain",),
@@ -553,6 +559,33 @@ STAGES: dict[str, Stage] = {
 }
 """The chain; a stage makes the product of its name. What sweeps change least comes first."""
 
+MEASURED = ("received", "trajectory", "recorded_trajectory")
+"""Products that come from a file of measured echoes."""
+
+
+def from_files(study: config.Study) -> tuple[str, ...]:
+    """Return the products that a study takes from files of the user's own."""
+    if study.measurement.file is not None:
+        return MEASURED
+    return ("elevation",) if study.scene.terrain == "file" else ()
+
+
+def stages(study: config.Study) -> dict[str, Stage]:
+    """Return the stages that a study has, in order.
+
+    Measured echoes come without the true scene: what is computed from it, or would compare with
+    it, is left out.
+    """
+    if study.measurement.file is None:
+        return STAGES
+    found: dict[str, Stage] = {}
+    for name, stage in STAGES.items():
+        simulated = any(key.split(".")[0] in config.SIMULATION for key in stage.sections)
+        known = set(stage.inputs) <= {*MEASURED, *found}
+        if name not in MEASURED and known and not simulated:
+            found[name] = stage
+    return found
+
 
 def run_stage(name: str, products: Mapping[str, xr.Dataset], study: config.Study) -> xr.Dataset:
     """Compute one stage.
@@ -575,6 +608,7 @@ def run_stage(name: str, products: Mapping[str, xr.Dataset], study: config.Study
     logger.info("stage %s", name)
     part = study.part(study.values(stage.sections))
     inputs = {key: products[key] for key in stage.inputs}
+    inputs |= {key: products[key] for key in stage.optional if key in products}
     if not stage.by_channel:
         return stage.compute(inputs, part)
     return join_channels(
@@ -606,7 +640,9 @@ def join_channels(parts: list[xr.Dataset]) -> xr.Dataset:
     return xr.Dataset(joined, coords)
 
 
-def run(study: config.Study, only: str | None = None) -> Products:
+def run(
+    study: config.Study, only: str | None = None, given: Mapping[str, xr.Dataset] | None = None
+) -> Products:
     """Take a study through all stages in memory.
 
     Parameters
@@ -615,28 +651,64 @@ def run(study: config.Study, only: str | None = None) -> Products:
         The configuration.
     only
         A product: compute no more than it needs.
+    given
+        Products that are there already, such as those from files of the user's own
+        (`ingest.read`); they are not computed.
 
     Returns
     -------
     dict of xarray.Dataset
-        Every product computed, by name.
+        Every product given and computed, by name.
 
     Raises
     ------
     KeyError
         If there is no such product.
+    ValueError
+        If a product from a file is not given.
     """
-    products: Products = {}
-    for name in STAGES if only is None else needed([only]):
+    products: Products = dict(given or {})
+    missing = [name for name in from_files(study) if name not in products]
+    if missing:
+        raise ValueError(f"{', '.join(missing)} must be given: the study takes them from a file")
+    waiting = {name: stage for name, stage in stages(study).items() if name not in products}
+    for name in waiting if only is None else needed([only], waiting):
         products[name] = run_stage(name, products, study)
     return products
 
 
-def _needed(product: str) -> set[str]:
-    return {product}.union(*(_needed(name) for name in STAGES[product].inputs))
+def needed(
+    products: Iterable[str], available: Mapping[str, Stage] | None = None
+) -> dict[str, Stage]:
+    """Return the stages that some products need, their own included, in order.
 
+    Parameters
+    ----------
+    products
+        Names of products.
+    available
+        The stages there are, all of the chain by default; what none of them makes is there
+        already.
 
-def needed(products: Iterable[str]) -> dict[str, Stage]:
-    """Return the stages that some products need, their own included, in order."""
-    wanted = set().union(*(_needed(name) for name in products))
-    return {name: stage for name, stage in STAGES.items() if name in wanted}
+    Returns
+    -------
+    dict of Stage
+        The stages by name.
+
+    Raises
+    ------
+    KeyError
+        If none of them makes one of the products.
+    """
+    available = STAGES if available is None else available
+    wanted: set[str] = set()
+
+    def want(name: str) -> None:
+        wanted.add(name)
+        for source in available[name].inputs:
+            if source in available:
+                want(source)
+
+    for product in products:
+        want(product)
+    return {name: stage for name, stage in available.items() if name in wanted}

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     Row = dict[str, Any]
     Results = tuple[dict[str, Row], dict[str, str]]
+    # Products by name, each with what tells it from others.
+    Given = Mapping[str, tuple[xr.Dataset, str]]
     Compute = Callable[
         [
             Callable[[list["Case"]], Results],
@@ -131,7 +133,7 @@ def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config
     ]
 
 
-def cases(study: config.Study, name: str) -> list[Case]:
+def cases(study: config.Study, name: str, *given: str) -> list[Case]:
     """Return a sweep's cases, those that share their first stages next to each other.
 
     Parameters
@@ -140,6 +142,8 @@ def cases(study: config.Study, name: str) -> list[Case]:
         The study that the sweep belongs to.
     name
         Name of the sweep.
+    *given
+        What tells the products from files from others.
 
     Returns
     -------
@@ -167,7 +171,7 @@ def cases(study: config.Study, name: str) -> list[Case]:
                 known.setdefault(text, len(known)) for known, text in zip(seen, texts, strict=True)
             ]
             one = case.model_copy(update={"realization": realization})
-            key = _digest(_text(values))
+            key = _digest(_text(values), *given)
             found.append((rank, Case((*index, realization), changes, one, key)))
     found.sort(key=lambda item: item[0])
     return [case for _, case in found]
@@ -267,19 +271,23 @@ class Memo:
         with self._lock:
             return {name: len(products) for name, products in self._kept.items()}
 
-    def products(self, names: Iterable[str], study: config.Study) -> pipeline.Products:
-        """Return products for a study, computing only what is not kept."""
+    def products(
+        self, names: Iterable[str], study: config.Study, given: Given | None = None
+    ) -> pipeline.Products:
+        """Return products for a study, computing only what is neither given nor kept."""
         with self._lock:
             self._active += 1
             self._capacity = max(self._capacity, 2 * self._active)
         try:
-            return self._products(tuple(names), study)
+            return self._products(tuple(names), study, given or {})
         finally:
             with self._lock:
                 self._active -= 1
 
-    def _products(self, wanted: tuple[str, ...], study: config.Study) -> pipeline.Products:
-        made: dict[str, _Product] = {}
+    def _products(
+        self, wanted: tuple[str, ...], study: config.Study, given: Given
+    ) -> pipeline.Products:
+        made = {name: _Product([product]) for name, product in given.items()}
         stages = pipeline.needed(wanted)
         values = study.values({name for stage in stages.values() for name in stage.sections})
         for name, stage in stages.items():
@@ -287,6 +295,7 @@ class Memo:
             text = _text(setting)
             compute = partial(_compute, stage, setting)
             inputs = {key: made[key] for key in stage.inputs}
+            inputs |= {key: made[key] for key in stage.optional if key in made}
             if stage.by_channel:
                 made[name] = _Product(
                     [
@@ -342,8 +351,11 @@ def _compute(
 
 def _identity(product: xr.Dataset, origin: str) -> str:
     """Return what tells a product from others: its numbers if they are few, else its origin."""
-    if product.nbytes > _SMALL_BYTES:
-        return origin
+    return origin if product.nbytes > _SMALL_BYTES else _fingerprint(product)
+
+
+def _fingerprint(product: xr.Dataset) -> str:
+    """Return a digest of a product's numbers and labels."""
     parts: list[str | bytes] = []
     for name, variable in sorted(product.variables.items(), key=lambda item: str(item[0])):
         values = variable.values
@@ -360,7 +372,7 @@ def _identity(product: xr.Dataset, origin: str) -> str:
 _MEMO = Memo()
 
 
-def run_case(case: Case, memo: Memo | None = None) -> Row:
+def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -> Row:
     """Compute one case.
 
     Parameters
@@ -369,6 +381,8 @@ def run_case(case: Case, memo: Memo | None = None) -> Row:
         The case.
     memo
         Where products are kept; by default, those of this process.
+    given
+        Products from files, each with what tells it from others.
 
     Returns
     -------
@@ -378,7 +392,7 @@ def run_case(case: Case, memo: Memo | None = None) -> Row:
     """
     memo = memo or _MEMO
     with blocks.serially():
-        products = memo.products(_RESULTS, case.study)
+        products = memo.products(_RESULTS, case.study, given)
     accuracy, interferogram, unwrapped, focus, truth = (products[name] for name in _RESULTS)
     row: Row = {name: accuracy[name].values.tolist() for name in _STATISTICS}
     visible = ~truth["shadow"].values
@@ -388,11 +402,11 @@ def run_case(case: Case, memo: Memo | None = None) -> Row:
     return row
 
 
-def _run_block(block: list[Case]) -> Results:
+def _run_block(given: Given, block: list[Case]) -> Results:
     rows, errors = {}, {}
     for case in block:
         try:
-            rows[case.key] = run_case(case)
+            rows[case.key] = run_case(case, given=given)
         except Exception as error:  # whatever a case raises must not cost the others
             errors[case.key] = f"{type(error).__name__}: {error}"
     return rows, errors
@@ -406,6 +420,7 @@ def run(
     keep: Callable[[dict[str, Row]], None],
     progress: Callable[[int, int], None],
     compute: Compute,
+    given: Mapping[str, xr.Dataset] | None = None,
 ) -> xr.Dataset:
     """Run a sweep.
 
@@ -426,6 +441,8 @@ def run(
         parallel, and calls, in this thread and in any order, ``receive`` with what it returns, or
         ``lost`` with a block that could not be run and a sentence that says why
         (`cluster.workers`).
+    given
+        Products from files of the user's own, which all cases share.
 
     Returns
     -------
@@ -439,7 +456,8 @@ def run(
     validation.ConfigurationError
         If a case is not valid; nothing has run then.
     """
-    everything = cases(study, name)
+    known = {label: (data, _fingerprint(data)) for label, data in (given or {}).items()}
+    everything = cases(study, name, *(print_ for _, print_ in known.values()))
     rows = {case.key: finished[case.key] for case in everything if case.key in finished}
     waiting = [case for case in everything if case.key not in rows]
     logger.info("%d of %d cases are finished", len(rows), len(everything))
@@ -457,7 +475,7 @@ def run(
         receive(({}, {case.key: reason for case in block}))
 
     if waiting:
-        compute(_run_block, _blocks(waiting), receive, lost)
+        compute(partial(_run_block, known), _blocks(waiting), receive, lost)
     if errors:
         listed = [f"{case}: {errors[case.key]}" for case in everything if case.key in errors]
         shown = "".join(f"\n  {line}" for line in listed[:10])

@@ -72,8 +72,8 @@ class ConfigurationError(ValueError):
         super().__init__(f"The configuration has {count} fault{'s' * (count > 1)}:{lines}")
 
 
-def load(*paths: str | Path) -> config.Study:
-    """Read configuration files, each overriding the ones before it, and check the result.
+def read(*paths: str | Path) -> dict[str, Any]:
+    """Read configuration files, each overriding the ones before it, and check nothing.
 
     Parameters
     ----------
@@ -82,13 +82,11 @@ def load(*paths: str | Path) -> config.Study:
 
     Returns
     -------
-    config.Study
-        The checked configuration.
+    dict
+        Keys with their values.
 
     Raises
     ------
-    ConfigurationError
-        If anything is wrong with it.
     ValueError
         If a file cannot be read as YAML.
     """
@@ -103,7 +101,30 @@ def load(*paths: str | Path) -> config.Study:
         if not isinstance(content, dict):
             raise ValueError(f"{path} holds {type(content).__name__}; keys with values are needed")
         merged = merge(merged, content)
-    return check(merged)
+    return merged
+
+
+def load(*paths: str | Path) -> config.Study:
+    """Read configuration files, each overriding the ones before it, and check the result.
+
+    Parameters
+    ----------
+    paths
+        YAML files, as in `read`.
+
+    Returns
+    -------
+    config.Study
+        The checked configuration.
+
+    Raises
+    ------
+    ConfigurationError
+        If anything is wrong with it.
+    ValueError
+        If a file cannot be read as YAML.
+    """
+    return check(read(*paths))
 
 
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,6 +170,7 @@ def check(raw: Mapping[str, Any]) -> config.Study:
             and isinstance(field.annotation, type)
             and issubclass(field.annotation, BaseModel)
         }
+    valid = _meaningful(valid)
     # A section that is wrong by itself would only confuse the rules that come after.
     for rules in (_WITHIN_SECTIONS, (_ahead,), _ACROSS_SECTIONS):
         found = list(_apply(rules, valid))
@@ -186,6 +208,7 @@ def variants(study: config.Study) -> dict[str, config.Study]:
     for name, changes in study.variants.items():
         try:
             found[name] = check(merge(base, changes) | {"variants": {}})
+            _refuse_other_files(found[name], study)
         except ConfigurationError as error:
             faults += [
                 Fault(f"variants.{name}: {fault.key}", fault.value, fault.allowed)
@@ -226,7 +249,9 @@ def sweep_studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], 
         for key, value in changes.items():
             raw = merge(raw, _nested(key, value))
         try:
-            found.append((changes, check(raw)))
+            case = check(raw)
+            _refuse_other_files(case, study)
+            found.append((changes, case))
         except ConfigurationError as error:
             for fault in error.faults:
                 # A fault that many cases share is told once, with the first of them.
@@ -238,6 +263,29 @@ def sweep_studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], 
     return found
 
 
+def _refuse_other_files(case: config.Study, study: config.Study) -> None:
+    """Refuse a case that needs another file, or another part of it, than its study reads."""
+    faults = [
+        Fault(
+            f"scene.{key}",
+            getattr(case.scene, key),
+            "must be the study's own, because the file is read once for all; make it a study",
+        )
+        for key in config.ELEVATION
+        if case.scene.terrain == "file" and getattr(case.scene, key) != getattr(study.scene, key)
+    ]
+    if study.measurement.file is not None or case.measurement.file is not None:
+        faults.append(
+            Fault(
+                "measurement.file",
+                case.measurement.file,
+                "must be null: without the true scene there is no accuracy to compare",
+            )
+        )
+    if faults:
+        raise ConfigurationError(faults)
+
+
 def _nested(key: str, value: Any) -> dict[str, Any]:
     section, _, rest = key.partition(".")
     return {section: _nested(rest, value) if rest else value}
@@ -245,8 +293,19 @@ def _nested(key: str, value: Any) -> dict[str, Any]:
 
 def advice(study: config.Study) -> list[str]:
     """Return what is allowed but unwise in a checked configuration, a sentence each."""
-    sections = {name: getattr(study, name) for name in config.Study.model_fields}
+    sections = _meaningful({name: getattr(study, name) for name in config.Study.model_fields})
     return [str(fault) for fault in _apply(_UNWISE, sections)]
+
+
+def _meaningful(sections: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out what measured echoes do without."""
+    measurement = sections.get("measurement")
+    measured = measurement is not None and measurement.file is not None
+    return {
+        name: section
+        for name, section in sections.items()
+        if not (measured and name in config.SIMULATION)
+    }
 
 
 def _apply(rules: Iterable[Rule], sections: Mapping[str, Any]) -> Iterator[Fault]:
@@ -365,7 +424,7 @@ def _scene_raster(scene: config.Scene) -> Iterator[Fault]:
             f"must be at most the facet size, {scene.facet_size_m} m",
         )
     # The deepest hollow of `peaks` is 0.81 times as deep as its highest top is high.
-    least = 0.0 if scene.terrain == "flat" else 0.8083 * scene.peak_height_m
+    least = 0.8083 * scene.peak_height_m if scene.terrain == "peaks" else 0.0
     if scene.reflectivity_offset < least:
         yield Fault(
             "scene.reflectivity_offset",
@@ -426,6 +485,17 @@ def _object_heights(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]
                     f"must be below radar.rail_height_m, {radar.rail_height_m:g} m: what "
                     "is as high hides all behind it",
                 )
+
+
+def _own_terrain(scene: config.Scene) -> Iterator[Fault]:
+    if scene.terrain == "file" and scene.file is None:
+        yield Fault("scene.file", None, "must name the file of scene.terrain 'file'")
+    if scene.terrain != "file" and scene.file is not None:
+        yield Fault(
+            "scene.file",
+            scene.file,
+            f"is not read for scene.terrain '{scene.terrain}'; take scene.terrain file, or null",
+        )
 
 
 def _image_grid(imaging: config.Imaging) -> Iterator[Fault]:
@@ -786,6 +856,7 @@ _WITHIN_SECTIONS: tuple[Rule, ...] = (
     _waveform,
     _scene_raster,
     _furniture,
+    _own_terrain,
     _image_grid,
     _goldstein_step,
     _heights_rise,

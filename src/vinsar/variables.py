@@ -120,6 +120,10 @@ _SHADOW = Variable(
     "cell hidden from either antenna at more than half of the positions",
     flag_meanings="visible shadow",
 )
+_TERRAIN = {
+    "height": Variable(_GRID, "real", "m", "true height above the ground plane"),
+    "reflectivity": Variable(_GRID, "real", "1", "reflectivity of the scene"),
+}
 _ECHO = {
     "echo": Variable(
         ("channel", "position", "frequency"),
@@ -134,10 +138,8 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
     "trajectory": _ANTENNAS,
     "true_trajectory": _ANTENNAS,
     "recorded_trajectory": _ANTENNAS,
-    "terrain": {
-        "height": Variable(_GRID, "real", "m", "true height above the ground plane"),
-        "reflectivity": Variable(_GRID, "real", "1", "reflectivity of the scene"),
-    },
+    "elevation": _TERRAIN,
+    "terrain": _TERRAIN,
     "facets": {
         "facet_position": Variable(("facet", "axis"), "real", "m", "position of the facet"),
         "reflectivity": Variable(("facet",), "real", "1", "reflectivity of the facet"),
@@ -161,6 +163,7 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
     },
     "echo": _ECHO,
     "received": _ECHO,
+    "measurement": _ECHO | _ANTENNAS,
     "profiles": {
         "profile": Variable(
             ("channel", "position", "slant_range"),

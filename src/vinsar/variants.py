@@ -7,18 +7,24 @@ from typing import TYPE_CHECKING
 from vinsar import pipeline, validation
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
 
     from vinsar import config
 
 
-def evaluate(study: config.Study) -> dict[str, xr.Dataset]:
+def evaluate(
+    study: config.Study, given: Mapping[str, xr.Dataset] | None = None
+) -> dict[str, xr.Dataset]:
     """Run a study and its variants.
 
     Parameters
     ----------
     study
         The configuration, with its `variants`.
+    given
+        Products from files of the user's own, the same for all.
 
     Returns
     -------
@@ -31,7 +37,7 @@ def evaluate(study: config.Study) -> dict[str, xr.Dataset]:
         If anything is wrong with a variant; then none is run.
     """
     cases = {"as configured": study} | validation.variants(study)
-    return {name: pipeline.run(case, only="accuracy")["accuracy"] for name, case in cases.items()}
+    return {name: pipeline.run(case, "accuracy", given)["accuracy"] for name, case in cases.items()}
 
 
 def as_markdown(results: dict[str, xr.Dataset]) -> str:

@@ -55,7 +55,7 @@ def test_the_paper_is_wise():
         ({"figures__formats": ["jpg"]}, "figures.formats[0]", "'pdf', 'svg' or 'png'"),
         ({"seed": -1}, "seed", "greater than or equal to 0"),
         ({"study": "a/b"}, "study", "match pattern"),
-        ({"scene__terrain": "peak"}, "scene.terrain", "'peaks' or 'flat'"),
+        ({"scene__terrain": "peak"}, "scene.terrain", "'peaks', 'flat' or 'file'"),
         ({"radar__stop_frequency_hz": "15e9"}, "radar.stop_frequency_hz", "write 15000000000"),
         ({"radar__stop_frequency_hz": 12e9}, "radar.stop_frequency_hz", "must exceed"),
         ({"radar__baseline_m": -0.3}, "radar.baseline_m", "greater than 0"),
