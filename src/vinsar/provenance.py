@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 _PACKAGE = Path(vinsar.__file__).parent
 _LIBRARIES = (
-    "dask", "finufft", "kamui", "matplotlib", "netCDF4", "numba", "numpy", "rasterio", "scikit-image",
-    "scipy", "whirlwind-insar", "xarray",
+    "dask", "finufft", "kamui", "matplotlib", "netCDF4", "numba", "numpy", "rasterio",
+    "scikit-image", "scipy", "whirlwind-insar", "xarray",
 )  # fmt: skip
 
 
