@@ -463,7 +463,7 @@ ELEVATION = (
 )
 """Keys of `Scene` that decide what is read from the file of a terrain."""
 
-SIMULATION = ("scene", "echo", "vehicle", "motion")
+SIMULATION = ("scene", "echo", "motion")
 """Sections that mean nothing to measured echoes."""
 
 

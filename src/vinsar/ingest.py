@@ -81,9 +81,10 @@ def check(raw: Mapping[str, Any]) -> config.Study:
         return validation.check(raw)
     with _blaming("measurement.file", path), _netcdf(path) as stored:
         frequency, antennas = _waveform(stored)
+        near = (raw.get("imaging") or {}).get("y_min_m")
+        if isinstance(near, float):
+            _refuse_misplaced(antennas, near)
     study = validation.check(validation.merge(raw, {"radar": _radar(frequency, antennas)}))
-    with _blaming("measurement.file", path):
-        _refuse_misplaced(antennas, study.imaging)
     _refuse_ambiguous(frequency, antennas, study.imaging)
     return study
 
@@ -224,7 +225,11 @@ def _blaming(key: str, path: str) -> Iterator[None]:
     try:
         yield
     except (OSError, RuntimeError, ValueError) as error:
-        raise validation.ConfigurationError([validation.Fault(key, path, str(error))]) from error
+        sentence = str(error)
+        if not isinstance(error, ValueError):
+            why = sentence.partition("\n")[0]
+            sentence = f"is truncated or of another format ({why}); write or copy it anew"
+        raise validation.ConfigurationError([validation.Fault(key, path, sentence)]) from error
 
 
 @contextmanager
@@ -236,9 +241,7 @@ def _netcdf(path: str | Path) -> Iterator[xr.Dataset]:
     try:
         opened = xr.open_dataset(path, engine="netcdf4", decode_times=False)
     except Exception as error:  # whatever foreign bytes bring about
-        raise ValueError(
-            f"is truncated or not netCDF ({error}); write or copy it anew, as docs/own-data.md says"
-        ) from error
+        raise OSError(str(error)) from error
     with opened:
         yield opened
 
@@ -266,11 +269,7 @@ def _geotiff_heights(path: Path) -> xr.Dataset:
     import xarray as xr
 
     _refuse_missing(path)
-    try:
-        opened = rasterio.open(path)
-    except rasterio.errors.RasterioIOError as error:
-        raise ValueError(f"is truncated or no GeoTIFF ({error}); write or copy it anew") from error
-    with opened as tiff:
+    with rasterio.open(path) as tiff:
         crs, place = tiff.crs, tiff.transform
         if crs is not None and crs.is_geographic:
             raise ValueError(
@@ -368,13 +367,13 @@ def _radar(frequency: Floats, antennas: Antennas) -> dict[str, Any]:
     }
 
 
-def _refuse_misplaced(antennas: Antennas, imaging: config.Imaging) -> None:
+def _refuse_misplaced(antennas: Antennas, near_edge_m: float) -> None:
     for name, places in zip(("transmitter", "receiver"), antennas, strict=True):
         foremost = places[..., 1].max()
-        if foremost >= imaging.y_min_m:
+        if foremost >= near_edge_m:
             raise ValueError(
                 f"variable '{name}' has an antenna at y = {foremost:g} m, not before the image, "
-                f"which begins at imaging.y_min_m = {imaging.y_min_m:g} m; y points ahead"
+                f"which begins at imaging.y_min_m = {near_edge_m:g} m; y points ahead"
             )
 
 

@@ -632,6 +632,17 @@ def _ahead(radar: config.Radar, scene: config.Scene, imaging: config.Imaging) ->
             )
 
 
+def _measured_in_motion(
+    measurement: config.Measurement, vehicle: config.Vehicle
+) -> Iterator[Fault]:
+    if measurement.file is not None and vehicle.forward_speed_m_per_s != 0:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            vehicle.forward_speed_m_per_s,
+            "must be 0 with measurement.file: its antenna positions have the motion in them",
+        )
+
+
 def _drives_short(
     radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
 ) -> Iterator[Fault]:
@@ -869,6 +880,7 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _odd_windows,
     _reference_in_image,
     _object_heights,
+    _measured_in_motion,
     _drives_short,
     _unambiguous,
     _facets_fine,

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import rasterio
 import xarray as xr
-from rasterio.transform import from_origin
 
 from vinsar import config, ingest, pipeline, storage, validation
 
@@ -125,10 +124,11 @@ def geotiff(path, *, values=None, transform=None, epsg=32632, bands=1, unit="", 
     pixel = np.arange(60) + 0.5
     plane = 100 + 0.01 * pixel + 0.02 * (60 - pixel[:, None])
     values = plane if values is None else values(plane)
+    north_up = rasterio.Affine(1, 0, 500_000, 0, -1, 5_500_060)
     with rasterio.open(
         path, "w", driver="GTiff", width=60, height=60, count=bands, dtype="float64",
         crs=None if epsg is None else f"EPSG:{epsg}", nodata=nodata,
-        transform=from_origin(500_000, 5_500_060, 1, 1) if transform is None else transform,
+        transform=north_up if transform is None else transform,
     ) as tiff:  # fmt: skip
         for band in range(1, bands + 1):
             tiff.write(values if band == 1 else np.full(values.shape, 0.25), band)
@@ -165,7 +165,7 @@ def test_a_ground_height_of_one_s_own_is_subtracted(tmp_path):
 
 def test_a_second_band_called_reflectivity_is_taken_as_such(tmp_path):
     own = own_terrain(geotiff(tmp_path / "two.tif", bands=2), **UTM)
-    assert np.all(ingest.read(own)["elevation"]["reflectivity"] == 0.25)
+    np.testing.assert_allclose(ingest.read(own)["elevation"]["reflectivity"], 0.25, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,7 @@ def put(name, index, value):
         (put("x", 3, 0.72), "variable 'x' is not sorted"),
         (put("x", 3, np.nan), "variable 'x' has 1 values that are missing"),
         (lambda data: data.isel(x=slice(1)), "variable 'x' has 1 value"),
-        (scaled("height", 10), "rises to 3.00 m above the ground plane"),
+        (scaled("height", 10), "rises to 3.20 m above the ground plane"),
         (scaled("height", -10), "reflectivity falls to"),
         (lambda data: data.assign(height=data["height"].astype(str)), "real numbers are needed"),
     ],
@@ -251,7 +251,11 @@ def test_heights_that_will_not_do_are_refused(tmp_path, change, sentence):
 @pytest.mark.parametrize("name", ["heights.nc", "heights.tif", "echo.nc"])
 @pytest.mark.parametrize(
     ("content", "sentence"),
-    [(None, "no such file"), (b"", "truncated or no"), (b"x, y, z\n1, 2, 3\n", "truncated or no")],
+    [
+        (None, "no such file"),
+        (b"", "truncated or of another"),
+        (b"x, y, z\n1, 2, 3\n", "truncated or of another"),
+    ],
 )
 def test_a_file_that_cannot_be_opened_is_refused(tmp_path, name, content, sentence):
     path = tmp_path / name
