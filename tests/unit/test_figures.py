@@ -28,16 +28,20 @@ from vinsar.figures import (
     height_error,
     maps,
     style,
+    summary,
     sweeps,
 )
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
 OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr"]
 NAMES = [
+    "summary",
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
     *("baseline_length", "baseline_angle", "baseline_vibration", "snr"),
 ]
 NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr"}
+# The front sheet is a slide, whatever the journal's columns and text are.
+SLIDES = {"summary": 338.7}
 FORMATS = ["pdf", "svg", "png"]
 SMALL: dict[str, dict[str, Any]] = {
     "radar": {"frequency_count": 101, "position_spacing_m": 0.02},
@@ -207,7 +211,7 @@ def test_figure_is_readable_and_takes_what_it_declares(
 ) -> None:
     figure = draw(name, products, study)
     width, height = figure.get_size_inches() * style.MM_PER_INCH
-    assert width == pytest.approx(88 if name in NARROW else 180)
+    assert width == pytest.approx(SLIDES.get(name, 88 if name in NARROW else 180))
     assert height < 247  # fits on a page of A4 with its caption
     check_readable(figure, monkeypatch)
 
@@ -237,9 +241,11 @@ def test_figure_has_the_width_and_the_text_asked_for_and_stays_readable(
     usual, figure = draw(name, products, study), draw(name, products, asked)
     width = asked.figures.one_column_mm if name in NARROW else asked.figures.two_columns_mm
     shape = usual.get_figheight() / usual.get_figwidth()
+    scale = asked.figures.font_size_pt / study.figures.font_size_pt
+    if name in SLIDES:
+        width, scale = SLIDES[name], 1.0
     assert figure.get_size_inches() * 25.4 == pytest.approx([width, shape * width])
     check_readable(figure, monkeypatch)
-    scale = asked.figures.font_size_pt / study.figures.font_size_pt
     expected = [round(size * scale, 3) for size in sizes(usual, monkeypatch)]
     assert sizes(figure, monkeypatch) == pytest.approx(expected, abs=0.002)
     fonts = {text.get_fontname() for text in drawn_texts(figure, monkeypatch)}
@@ -431,6 +437,29 @@ def test_statistics_are_the_product_s(
         for number, key in zip(numbers[4:], shares, strict=True):
             assert number == pytest.approx(100 * float(part[key]), abs=0.051), key
     assert "≤ 5 cm" in rows[0]
+
+
+def test_front_sheet_says_what_the_product_holds_and_large(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = draw("summary", products, study)
+    texts = written(figure, monkeypatch)
+    accuracy = products["accuracy"]
+    whole = accuracy.sel(region="whole_scene")
+    visible = accuracy.sel(region="visible_ground")
+    numbers = [texts[texts.index(number)] for number, _ in summary.statistics(accuracy)]
+    assert [float(number.split()[0]) for number in numbers] == pytest.approx(
+        [
+            round(100 * float(whole["fraction_within_tolerance"]), 1),
+            round(100 * float(whole["std"]), 1),
+            round(100 * float(visible["std"]), 1),
+            round(100 * float(whole["maximum_absolute"])),
+        ]
+    )
+    images = [axes.images[0] for axes in figure.axes if axes.images]
+    np.testing.assert_allclose(images[4].get_array(), 100 * accuracy["height_error"])
+    # A thirtieth of the slide's height is what a room's last row reads.
+    assert min(sizes(figure, monkeypatch)) >= 0.99 * figure.get_figheight() * 72 / 35
 
 
 def test_histogram_counts_every_cell_once(products: pipeline.Products, study: config.Study) -> None:

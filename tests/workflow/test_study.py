@@ -13,12 +13,12 @@ from vinsar import accuracy, claims, figures, pipeline, storage, validation
 ROOT = Path(__file__).parents[2]
 OF_SWEEPS = {"figure_fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr"}
 FIGURE_RULES = {
-    "figure_fig1", "figure_fig2", "figure_fig3", "figure_fig3_panels", "figure_fig4",
-    "figure_baseline_angle", *OF_SWEEPS,
+    "figure_summary", "figure_fig1", "figure_fig2", "figure_fig3", "figure_fig3_panels",
+    "figure_fig4", "figure_baseline_angle", *OF_SWEEPS,
 }  # fmt: skip
 AFTER_FILTERING = {
     "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims",
-    "figure_fig3", "figure_fig3_panels", "figure_fig4", "sweep", *OF_SWEEPS,
+    "figure_summary", "figure_fig3", "figure_fig3_panels", "figure_fig4", "sweep", *OF_SWEEPS,
 }  # fmt: skip
 
 

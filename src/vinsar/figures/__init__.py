@@ -18,6 +18,7 @@ from vinsar.figures import (
     height_error,
     noise,
     registration_error,
+    summary,
     vibration,
 )
 from vinsar.figures.files import save
@@ -57,6 +58,7 @@ class Figure:
 
 
 FIGURES: dict[str, Figure] = {
+    "summary": Figure(summary.draw, summary.INPUTS, ("figures", "radar")),
     "fig1": Figure(acquisition.draw, (), ("figures", "radar", "scene", "imaging")),
     "fig2": Figure(registration_error.draw, ("registration",), ("figures",)),
     "fig3": Figure(chain.draw_sheet, chain.SHEET_INPUTS, ("figures",)),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.figures import maps, style
+from vinsar.figures import chain, maps, style
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,26 +43,16 @@ def draw(products: Products, study: config.Study) -> Figure:
     accuracy = products["accuracy"]
     error = accuracy["height_error"]
     tolerance = float(accuracy["tolerance"])
-    limit = 3 * tolerance
     left, bottom, width = 13.0, 13.0, 60.0
     _, height = maps.fit(error, width, 90)
     height = max(height, 66.0)
     figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + height + 7)
 
     title = "(a) height error, reconstructed minus true"
+    shown = layer(accuracy)
     axes = maps.place(figure, error, (left, bottom, width, height), title)
-    image = maps.draw(
-        axes,
-        error * 100,
-        colormap=style.colormap("cmc.vik"),
-        limits=(-limit * 100, limit * 100),
-    )
-    maps.colorbar(
-        axes,
-        image,
-        "height error (cm)",
-        extend=maps.beyond(error.values, (-limit, limit)),
-    )
+    image = maps.draw(axes, shown.data, colormap=shown.colormap, limits=shown.limits)
+    maps.colorbar(axes, image, shown.label, extend=shown.extend)
     if maps.outline_shadow(axes, accuracy["shadow"]):
         below = bottom + height - style.size_mm(axes)[1] - 11.5
         maps.explain_shadow(figure, left, below, maps.SHADOW_LABEL)
@@ -75,6 +65,31 @@ def draw(products: Products, study: config.Study) -> Figure:
     )
     _table(style.place(figure, left, bottom + height - 22, room, 22), accuracy)
     return figure
+
+
+def layer(accuracy: xr.Dataset) -> chain.Layer:
+    """Return the map of the height error, in centimetres up to three tolerances.
+
+    Parameters
+    ----------
+    accuracy
+        Product ``accuracy``.
+
+    Returns
+    -------
+    chain.Layer
+        Values with their colours.
+    """
+    error = accuracy["height_error"] * 100
+    limit = 300 * float(accuracy["tolerance"])
+    limits = (-limit, limit)
+    return chain.Layer(
+        error,
+        style.colormap("cmc.vik"),
+        limits,
+        "height error (cm)",
+        maps.beyond(error.values, limits),
+    )
 
 
 def bin_edges(error: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
@@ -167,18 +182,19 @@ def table_rows(accuracy: xr.Dataset) -> list[list[str]]:
     for region, name in _REGIONS.items():
         part = accuracy.sel(region=region)
         lengths = [
-            _written(float(part[key]) * 100, ".2f")
+            written(float(part[key]) * 100, ".2f")
             for key in ("median", "std", "percentile_95_absolute", "maximum_absolute")
         ]
         shares = [
-            _written(float(part[key]) * 100, ".1f")
+            written(float(part[key]) * 100, ".1f")
             for key in ("fraction_within_tolerance", "fraction_reconstructed")
         ]
         rows.append([name, f"{int(part['cell_count'])}", *lengths, *shares])
     return rows
 
 
-def _written(value: float, form: str) -> str:
+def written(value: float, form: str) -> str:
+    """Return a number as figures write it: a real minus, none before zero, a dash for NaN."""
     if not np.isfinite(value):
         return "–"
     text = f"{value:{form}}"

@@ -246,9 +246,10 @@ def outline_shadow(axes: Axes, shadow: xr.DataArray) -> bool:
     share = ndimage.uniform_filter(shadow.values.astype(float), size, mode="nearest")
     if not share.min() < 0.5 < share.max():
         return False
-    lines = axes.contour(x, y, share, levels=[0.5], colors="white", linewidths=0.5)
+    lines = axes.contour(x, y, share, levels=[0.5], colors="white", linewidths=style.points(0.5))
     # A dark casing keeps the line visible on every colour.
-    lines.set_path_effects([patheffects.withStroke(linewidth=1.2, foreground="black")])
+    casing = patheffects.withStroke(linewidth=style.points(1.2), foreground="black")
+    lines.set_path_effects([casing])
     return True
 
 
@@ -268,8 +269,9 @@ def explain_shadow(figure: Figure, left_mm: float, bottom_mm: float, text: str) 
     from matplotlib.lines import Line2D
 
     width, height = style.page_mm(figure)
-    piece = Line2D([], [], color="white", linewidth=0.5, label=text)
-    piece.set_path_effects([patheffects.withStroke(linewidth=1.2, foreground="black")])
+    piece = Line2D([], [], color="white", linewidth=style.points(0.5), label=text)
+    casing = patheffects.withStroke(linewidth=style.points(1.2), foreground="black")
+    piece.set_path_effects([casing])
     figure.legend(
         handles=[piece],
         loc="lower left",

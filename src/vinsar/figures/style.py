@@ -137,6 +137,21 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     return wrapper
 
 
+def styled_for_slides(font_size_pt: float) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a function draw in the style with text of a size of its own, for slides."""
+
+    def decorate(draw: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(draw)
+        def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+            study: Any = kwargs.get("study", args[-1] if args else None)
+            with applied(study.figures.model_copy(update={"font_size_pt": font_size_pt})):
+                return draw(*args, **kwargs)
+
+        return wrapper
+
+    return decorate
+
+
 def new_figure(width_mm: float, height_mm: float) -> Figure:
     """Return an empty figure of this size, outside any graphical interface.
 
