@@ -32,33 +32,31 @@ ANGLES_DEG = np.arange(0.0, 91.0)
 
 @dataclass(frozen=True)
 class View:
-    """The radar over the middle of its scene, on the ground plane.
+    """The radar over a point of the ground plane.
+
+    With a switched array the baseline separates one end of the path alone: the phase is that of
+    Eq. 1 with twice the wavelength, and the antennas here are the two that the baseline separates.
 
     Attributes
     ----------
-    antenna_height_m
-        Height H1 of the lower antenna, m.
+    lower
+        Position (3,) of the lower antenna, m.
     x_m, y_m
-        The middle of the scene, m.
+        The point, m.
     wavelength_m
-        Wavelength of the carrier, m.
+        Wavelength of the carrier; twice that of a switched array, m.
     range_resolution_m
         Slant-range resolution, m.
     baseline_angle
         Attitude beta of the baseline, rad.
     """
 
-    antenna_height_m: float
+    lower: Floats
     x_m: float
     y_m: float
     wavelength_m: float
     range_resolution_m: float
     baseline_angle: float
-
-    @property
-    def lower(self) -> Floats:
-        """Position of the lower antenna (3,), m."""
-        return np.array([0.0, 0.0, self.antenna_height_m])
 
     @property
     def slant_range(self) -> float:
@@ -108,6 +106,8 @@ class View:
 def view(radar_: config.Radar, scene: config.Scene) -> View:
     """Return a radar over the middle of its scene.
 
+    On a rail and in a receive pair the antennas stand on x = y = 0.
+
     Parameters
     ----------
     radar_
@@ -121,11 +121,16 @@ def view(radar_: config.Radar, scene: config.Scene) -> View:
         The geometry.
     """
     band = np.array([radar_.start_frequency_hz, radar_.stop_frequency_hz])
+    place = np.array([0.0, 0.0, radar_.rail_height_m])
+    if radar_.system == "transmit_pair":
+        place = np.array(
+            [radar_.transmitter_x_m, radar_.transmitter_y_m, radar_.transmitter_height_m]
+        )
     return View(
-        antenna_height_m=radar_.rail_height_m,
+        lower=place,
         x_m=(scene.x_min_m + scene.x_max_m) / 2,
         y_m=(scene.y_min_m + scene.y_max_m) / 2,
-        wavelength_m=radar.wavelength(radar.carrier(band)),
+        wavelength_m=radar.wavelength(radar.carrier(band)) * (1 if radar_.system == "rail" else 2),
         range_resolution_m=radar.range_resolution(float(band[1] - band[0])),
         baseline_angle=float(np.deg2rad(radar_.baseline_angle_deg)),
     )
@@ -183,9 +188,9 @@ def height_per_length(seen: View, baseline_m: float, baseline_angle: ArrayLike) 
     ndarray
         Derivative at the true baseline, for a target on the ground plane.
     """
-    ground = seen.y_m
-    across_range = np.hypot(ground, seen.antenna_height_m)
-    look = np.arctan2(ground, seen.antenna_height_m)
+    ground, height = seen.y_m - seen.lower[1], seen.lower[2]
+    across_range = np.hypot(ground, height)
+    look = np.arctan2(ground, height)
     angle = np.asarray(baseline_angle) - look
     return ground * np.tan(angle) / baseline_m + ground / across_range / np.cos(angle)
 
@@ -240,8 +245,8 @@ def angle_errors(
             phase,
             baseline_m=length,
             baseline_angle=angle,
-            antenna_height=seen.antenna_height_m,
-            along_track=seen.x_m,
+            antenna_height=float(seen.lower[2]),
+            along_track=seen.x_m - seen.lower[0],
             wavelength_m=seen.wavelength_m,
         )
         return np.nanstd(height, axis=1)

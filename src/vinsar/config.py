@@ -31,17 +31,42 @@ class Section(BaseModel):
 class Radar(Section):
     """The radar and its antennas (Table 1)."""
 
-    system: Literal["rail"] = _key("antenna arrangement: one cart on a roof rail", "section 1")
+    system: Literal["rail", "transmit_pair", "receive_pair"] = _key(
+        "antenna arrangement: a cart with both antennas on a roof rail, or switched arrays in its "
+        "place: one receives and transmitters stand at two heights, or two receive at two heights "
+        "and one transmitter stands",
+        "section 1",
+    )
     start_frequency_hz: float = _key("lowest frequency", "Table 1", gt=0)
     stop_frequency_hz: float = _key("highest frequency", "Table 1", gt=0)
     frequency_count: int = _key("number of frequencies, evenly spaced", "not given", ge=2)
-    aperture_length_m: float = _key("length of the synthetic aperture along x", "Table 1", gt=0)
-    position_spacing_m: float = _key("spacing of the antenna positions", "Table 1", gt=0)
-    rail_height_m: float = _key("height of the lower antenna above ground, H0", "not given", gt=0)
-    baseline_m: float = _key("distance between the antennas, B", "Table 1", gt=0)
+    aperture_length_m: float = _key(
+        "length of the aperture along x: of the rail or the array", "Table 1", gt=0
+    )
+    position_spacing_m: float = _key(
+        "spacing of the antenna positions, or of the array's elements", "Table 1", gt=0
+    )
+    rail_height_m: float = _key(
+        "height above ground of the lower antenna on the rail, or of the array (the lower of two), "
+        "H0",
+        "not given",
+        gt=0,
+    )
+    baseline_m: float = _key(
+        "distance between the antennas, the transmitters of a transmit pair, or the arrays, B",
+        "Table 1",
+        gt=0,
+    )
     baseline_angle_deg: float = _key(
         "attitude of the baseline from horizontal, beta; 90 is vertical", "Table 1", ge=0, le=180
     )
+    transmitter_x_m: float = _key(
+        "place of an array's transmitter (the lower of two) along the array, from its middle",
+        "not given",
+    )
+    transmitter_y_m: float = _key("its place ahead of the array", "not given")
+    transmitter_height_m: float = _key("its height above ground", "not given", gt=0)
+    dwell_s: float = _key("time for each frequency of an array's sweep", "not given", gt=0, le=1)
 
 
 class _Placed(Section):

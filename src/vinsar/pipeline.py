@@ -440,6 +440,9 @@ _ANTENNAS = (
     "radar.rail_height_m",
     "radar.baseline_m",
     "radar.baseline_angle_deg",
+    "radar.transmitter_x_m",
+    "radar.transmitter_y_m",
+    "radar.transmitter_height_m",
 )
 _DRAWS = ("seed", "realization")
 _GRID = (

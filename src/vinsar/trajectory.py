@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -28,12 +28,24 @@ def planned(radar: config.Radar) -> xr.Dataset:
     xarray.Dataset
         Product ``trajectory``.
     """
-    return rail(
-        aperture_length_m=radar.aperture_length_m,
-        position_spacing_m=radar.position_spacing_m,
-        rail_height_m=radar.rail_height_m,
-        baseline_m=radar.baseline_m,
-        baseline_angle_deg=radar.baseline_angle_deg,
+    baseline = {
+        "baseline_m": radar.baseline_m,
+        "baseline_angle_deg": radar.baseline_angle_deg,
+    }
+    if radar.system == "rail":
+        return rail(
+            aperture_length_m=radar.aperture_length_m,
+            position_spacing_m=radar.position_spacing_m,
+            rail_height_m=radar.rail_height_m,
+            **baseline,
+        )
+    return switched_array(
+        baseline_between="transmitters" if radar.system == "transmit_pair" else "receivers",
+        array_length_m=radar.aperture_length_m,
+        element_spacing_m=radar.position_spacing_m,
+        array_height_m=radar.rail_height_m,
+        transmitter=(radar.transmitter_x_m, radar.transmitter_y_m, radar.transmitter_height_m),
+        **baseline,
     )
 
 
@@ -73,16 +85,75 @@ def rail(
     ValueError
         If the spacing does not divide the length.
     """
-    half = aperture_length_m / 2
-    x = geometry.grid_axis(-half, half, position_spacing_m)
-    beta = np.deg2rad(baseline_angle_deg)
-    antennas = np.zeros((2, x.size, 3))
-    antennas[..., 0] = x
-    antennas[..., 2] = rail_height_m
-    # The paper's vertical baseline has no y offset at all, not 1e-17 m.
-    antennas[1, :, 1] += baseline_m * (0.0 if baseline_angle_deg == 90 else np.cos(beta))
-    antennas[1, :, 2] += baseline_m * np.sin(beta)
+    line = _line(aperture_length_m, position_spacing_m, rail_height_m)
+    antennas = np.stack([line, line + _baseline(baseline_m, baseline_angle_deg)])
     return variables.dataset("trajectory", {"transmitter": antennas, "receiver": antennas.copy()})
+
+
+def switched_array(
+    *,
+    baseline_between: Literal["transmitters", "receivers"],
+    array_length_m: float,
+    element_spacing_m: float,
+    array_height_m: float,
+    transmitter: tuple[float, float, float],
+    baseline_m: float,
+    baseline_angle_deg: float,
+) -> xr.Dataset:
+    """Return the positions of a switched array: one end of each path stands still.
+
+    A position is an element of the receive array, which lies along x, centred on x = 0 at y = 0.
+
+    Parameters
+    ----------
+    baseline_between
+        Two transmitters and one receive array, or two receive arrays and one transmitter.
+    array_length_m
+        Distance between the first and the last element, m.
+    element_spacing_m
+        Spacing of the elements, m; it must divide the length.
+    array_height_m
+        Height H0 of the array, the lower one of two, m.
+    transmitter
+        Position of the transmitter, the lower one of two, m.
+    baseline_m
+        Distance B between the transmitters, or between the arrays, m.
+    baseline_angle_deg
+        Attitude beta of the baseline from horizontal, degrees; 90 is vertical.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory``: ``transmitter`` and ``receiver`` (channel, position, axis), m.
+
+    Raises
+    ------
+    ValueError
+        If the spacing does not divide the length.
+    """
+    line = _line(array_length_m, element_spacing_m, array_height_m)
+    still = np.broadcast_to(np.array(transmitter, float), line.shape)
+    step = np.stack([np.zeros(3), _baseline(baseline_m, baseline_angle_deg)])[:, None]
+    between_transmitters = baseline_between == "transmitters"
+    return variables.dataset(
+        "trajectory",
+        {
+            "transmitter": still + step * between_transmitters,
+            "receiver": line + step * (not between_transmitters),
+        },
+    )
+
+
+def _line(length_m: float, spacing_m: float, height_m: float) -> NDArray[np.floating]:
+    x = geometry.grid_axis(-length_m / 2, length_m / 2, spacing_m)
+    return np.stack([x, np.zeros(x.size), np.full(x.size, height_m)], axis=-1)
+
+
+def _baseline(length_m: float, angle_deg: float) -> NDArray[np.floating]:
+    beta = np.deg2rad(angle_deg)
+    # The paper's vertical baseline has no y offset at all, not 1e-17 m.
+    across = 0.0 if angle_deg == 90 else np.cos(beta)
+    return length_m * np.array([0.0, across, np.sin(beta)])
 
 
 def apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:

@@ -10,7 +10,7 @@ import inspect
 import itertools
 import re
 import typing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from vinsar import colormaps, config, geometry, radar, trajectory
+from vinsar import aperture, baseline, colormaps, config, geometry, radar, trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -592,37 +592,44 @@ class _Derived:
     shortest_wavelength: float
     range_cell: float
     unambiguous_range: float
-    aperture: Any
-    lower: Any
-    upper: Any
+    antennas: Any
+    apertures: Any
 
     @classmethod
     def of(cls, section: config.Radar) -> _Derived:
         frequency = radar.frequencies(
             section.start_frequency_hz, section.stop_frequency_hz, section.frequency_count
         )
-        beta = np.deg2rad(section.baseline_angle_deg)
+        antennas = trajectory.planned(section)
         return cls(
             frequency=frequency,
             wavelength=radar.wavelength(radar.carrier(frequency)),
             shortest_wavelength=radar.wavelength(section.stop_frequency_hz),
             range_cell=radar.range_resolution(float(frequency[-1] - frequency[0])),
             unambiguous_range=radar.unambiguous_range(float(frequency[1] - frequency[0])),
-            aperture=trajectory.apertures(trajectory.planned(section))[0],
-            lower=np.array([0.0, 0.0, section.rail_height_m]),
-            upper=np.array(
-                [
-                    0.0,
-                    section.baseline_m * np.cos(beta),
-                    section.rail_height_m + section.baseline_m * np.sin(beta),
-                ]
-            ),
+            antennas=antennas,
+            apertures=trajectory.apertures(antennas),
         )
+
+    @property
+    def foremost(self) -> float:
+        """How far ahead of y = 0 an antenna stands, m."""
+        y = [float(self.antennas[name][..., 1].max()) for name in ("transmitter", "receiver")]
+        return max(0.0, *y)
+
+    def reach(
+        self, part: config.Scene | config.Imaging, behind_m: float = 0.0
+    ) -> tuple[float, float]:
+        """Return the nearest and the farthest slant range of a part of the ground, m."""
+        x, y = (
+            np.array([getattr(part, f"{axis}_{end}_m") for end in ("min", "max")]) for axis in "xy"
+        )
+        return trajectory.range_extent(self.antennas, x, y + np.array([0.0, behind_m]))
 
 
 def _ahead(radar: config.Radar, scene: config.Scene, imaging: config.Imaging) -> Iterator[Fault]:
     # Half a wavelength would do for the mathematics; a facet does for the visibility.
-    foremost = max(0.0, float(_Derived.of(radar).upper[1])) + scene.facet_size_m
+    foremost = _Derived.of(radar).foremost + scene.facet_size_m
     for name, part in (("scene", scene), ("imaging", imaging)):
         if part.y_min_m < foremost:
             yield Fault(
@@ -647,7 +654,7 @@ def _drives_short(
     radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
 ) -> Iterator[Fault]:
     speed, duration = vehicle.forward_speed_m_per_s, vehicle.scan_duration_s
-    foremost = max(0.0, float(_Derived.of(radar).upper[1])) + scene.facet_size_m
+    foremost = _Derived.of(radar).foremost + scene.facet_size_m
     room = min(scene.y_min_m, imaging.y_min_m) - foremost
     if 0 < room < speed * duration / 2:
         yield Fault(
@@ -663,11 +670,9 @@ def _unambiguous(
     radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
 ) -> Iterator[Fault]:
     derived = _Derived.of(radar)
-    half = radar.aperture_length_m / 2
     behind = vehicle.forward_speed_m_per_s * vehicle.scan_duration_s / 2
     for name, part in (("scene", scene), ("imaging", imaging)):
-        lateral = max(abs(part.x_min_m), abs(part.x_max_m)) + half
-        far = float(np.hypot(np.hypot(lateral, part.y_max_m + behind), derived.upper[2]))
+        _, far = derived.reach(part, behind)
         if far > derived.unambiguous_range:
             count = int(np.ceil((radar.frequency_count - 1) * far / derived.unambiguous_range)) + 1
             yield Fault(
@@ -703,21 +708,28 @@ def _cell(radar_: config.Radar, part: config.Scene | config.Imaging) -> float:
     derived = _Derived.of(radar_)
     x = np.clip(0.0, part.x_min_m, part.x_max_m)
     cells = [
-        radar.ground_resolution(derived.aperture, x, y, frequency=derived.frequency)
+        radar.ground_resolution(derived.apertures[0], x, y, frequency=derived.frequency)
         for y in (part.y_min_m, part.y_max_m)
     ]  # fmt: skip
     return float(np.min(cells))
 
 
-def _positions_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+def _widest_spacing(radar: config.Radar, scene: config.Scene) -> float:
+    """Return the widest spacing of positions that images the scene's width without ambiguity, m."""
     derived = _Derived.of(radar)
     half = radar.aperture_length_m / 2
     # Echoes from the sines s1 and s2 of the squint are told apart while the phase between
-    # neighbouring positions, 4 pi d (s1 - s2) / lambda, stays within a turn.
+    # neighbouring positions, 4 pi d (s1 - s2) / lambda, stays within a turn; where one end of the
+    # path stands still, half of it.
     edge = np.array([scene.x_min_m - half, scene.x_max_m + half])
-    sine = edge / np.hypot(np.hypot(edge, scene.y_min_m), derived.lower[2])
-    most = derived.shortest_wavelength / (2 * float(sine[1] - sine[0]))
-    if radar.position_spacing_m > most:
+    sine = edge / np.hypot(np.hypot(edge, scene.y_min_m), radar.rail_height_m)
+    moving_ends = 2 if radar.system == "rail" else 1
+    return derived.shortest_wavelength / (moving_ends * float(sine[1] - sine[0]))
+
+
+def _positions_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    most = _widest_spacing(radar, scene)
+    if radar.system == "rail" and radar.position_spacing_m > most:
         yield Fault(
             "radar.position_spacing_m",
             radar.position_spacing_m,
@@ -731,9 +743,7 @@ def _gate_before_image(
     if suppression.method not in ("gate", "both"):
         return
     derived = _Derived.of(radar)
-    lateral = max(abs(imaging.x_min_m), abs(imaging.x_max_m)) + radar.aperture_length_m / 2
-    far = float(np.linalg.norm([lateral, imaging.y_max_m, derived.upper[2]]))
-    near = float(np.hypot(imaging.y_min_m - derived.upper[1], derived.lower[2]))
+    near, far = derived.reach(imaging)
     # Ranges repeat: the gate lies beyond the image as well.
     most = min(near / 2, derived.unambiguous_range - far)
     if suppression.gate_range_m > most:
@@ -747,19 +757,23 @@ def _gate_before_image(
 
 def _targets_imaged(radar: config.Radar, registration: config.Registration) -> Iterator[Fault]:
     derived = _Derived.of(radar)
-    foremost = max(0.0, float(derived.upper[1]))
+    heights = np.array([registration.height_min_m, registration.height_max_m])
     for name, target in (("near", registration.near), ("far", registration.far)):
-        ahead = target.y_m - foremost
-        heights = np.array([registration.height_min_m, registration.height_max_m])
-        if (
-            ahead <= 0
-            or np.isnan(geometry.circle_image_y(ahead, heights, float(derived.upper[2]))).any()
-        ):
+        images = [
+            aperture.image_position(part, target.x_m, target.y_m, heights)
+            for part in derived.apertures
+        ]
+        if target.y_m <= derived.foremost or np.isnan(images).any():
             yield Fault(
                 f"registration.{name}.y_m",
                 target.y_m,
                 "must be farther ahead: a target of these heights has no image on the ground",
             )
+
+
+def _claims_of_a_rail(radar: config.Radar, outputs: config.Outputs) -> Iterator[Fault]:
+    if outputs.claims and radar.system != "rail":
+        yield Fault("outputs.claims", True, "must be false: the paper's claims are those of a rail")
 
 
 def _colormaps(figures: config.Figures) -> Iterator[Fault]:
@@ -792,21 +806,27 @@ def _figure_files(figures: config.Figures) -> Iterator[Fault]:
 
 
 def _baseline_short(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
-    derived = _Derived.of(radar)
     x = float(np.clip(0.0, scene.x_min_m, scene.x_max_m))
-    look = geometry.look_angle(derived.lower, x, scene.y_min_m)
-    range_ = geometry.slant_range(derived.lower, x, scene.y_min_m)
-    limit = geometry.critical_baseline(range_, derived.wavelength, look, derived.range_cell) / 4
-    _, across = geometry.baseline_components(
-        radar.baseline_m, np.deg2rad(radar.baseline_angle_deg), look
-    )
-    if abs(across) > limit:
+    seen = replace(baseline.view(radar, scene), x_m=x, y_m=scene.y_min_m)
+    limit, across = seen.critical_baseline / 4, float(seen.across(radar.baseline_m))
+    if across > limit:
         yield Fault(
             "radar.baseline_m",
             radar.baseline_m,
-            f"its part across the line of sight, {abs(float(across)):.3f} m, exceeds a quarter of "
-            f"the critical baseline, {float(limit):.3f} m, at the scene's near edge: coherence "
+            f"its part across the line of sight, {across:.3f} m, exceeds a quarter of "
+            f"the critical baseline, {limit:.3f} m, at the scene's near edge: coherence "
             "will suffer",
+        )
+
+
+def _elements_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]:
+    most = _widest_spacing(radar, scene)
+    if radar.system != "rail" and radar.position_spacing_m > most:
+        yield Fault(
+            "radar.position_spacing_m",
+            radar.position_spacing_m,
+            f"is wider than {most:.4f} m: grating lobes of the array fold the scene's edges over "
+            "each other",
         )
 
 
@@ -888,9 +908,11 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _positions_dense,
     _gate_before_image,
     _targets_imaged,
+    _claims_of_a_rail,
 )
 _UNWISE: tuple[Rule, ...] = (
     _baseline_short,
+    _elements_dense,
     _facets_coarse,
     _coupling_in_gate,
     _image_in_scene,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import baseline, geometry, validation, variables
+from vinsar import aperture, baseline, geometry, trajectory, validation, variables
 
 BASELINE_M = 0.3
 LENGTH_STD_M = 1e-5
@@ -16,7 +16,7 @@ CHANCE = 1 / np.sqrt(2 * (DRAWS - 1))
 
 
 def view(x_m=0.0, y_m=13.0, antenna_height_m=2.0):
-    return baseline.View(antenna_height_m, x_m, y_m, 0.0214, 0.075, np.pi / 2)
+    return baseline.View(np.array([0.0, 0.0, antenna_height_m]), x_m, y_m, 0.0214, 0.075, np.pi / 2)
 
 
 def errors(seen, seed=1, baseline_m=BASELINE_M):
@@ -89,7 +89,7 @@ def test_the_exact_derivative_is_that_of_the_inversion(x):
             phase,
             baseline_m=BASELINE_M + shift,
             baseline_angle=beta,
-            antenna_height=seen.antenna_height_m,
+            antenna_height=seen.lower[2],
             along_track=seen.x_m,
             wavelength_m=seen.wavelength_m,
         )
@@ -106,7 +106,7 @@ def test_the_same_seed_gives_the_same_draws_and_another_gives_others(drawn):
 def test_the_view_is_that_of_the_configuration():
     study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
     seen = baseline.view(study.radar, study.scene)
-    assert (seen.x_m, seen.y_m, seen.antenna_height_m) == (0.0, 13.0, 2.0)
+    assert (seen.x_m, seen.y_m, *seen.lower) == (0.0, 13.0, 0.0, 0.0, 2.0)
     # The figures of the method: 0.469 m of height for a cycle, at x = 0 and y = 13 m.
     assert float(seen.height_of_ambiguity(0.3)) == pytest.approx(0.469, abs=5e-4)
     assert float(seen.height_of_ambiguity(0.3)) == pytest.approx(
@@ -117,6 +117,18 @@ def test_the_view_is_that_of_the_configuration():
         )
     )
     assert seen.critical_baseline == pytest.approx(12.21, abs=0.01)
+
+
+@pytest.mark.parametrize("system", ["transmit_pair", "receive_pair"])
+def test_the_view_of_an_array_has_half_the_phase(system):
+    study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
+    radar = study.radar.model_copy(update={"system": system})
+    rail, array = (baseline.view(part, study.scene) for part in (study.radar, radar))
+    lower, upper = trajectory.apertures(trajectory.planned(radar))
+    exact = aperture.height_of_ambiguity(lower, upper, array.x_m, array.y_m, rail.wavelength_m)
+    # The plane wave has r1 for r2, 0.3 % shorter.
+    assert float(array.height_of_ambiguity(0.3)) == pytest.approx(float(exact), rel=5e-3)
+    assert array.critical_baseline == pytest.approx(2 * rail.critical_baseline, rel=0.06)
 
 
 def test_a_random_phase_spreads_the_height_over_the_height_of_ambiguity():

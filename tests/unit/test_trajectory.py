@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import trajectory
+from vinsar import trajectory, validation
 
 
 def make(angle_deg, **changes):
@@ -58,6 +60,40 @@ def test_transmitter_and_receiver_are_equal_but_stand_on_their_own():
 def test_a_spacing_that_does_not_divide_the_aperture_is_refused():
     with pytest.raises(ValueError, match="not a multiple of the spacing"):
         make(90.0, position_spacing_m=0.03)
+
+
+ARRAY = {
+    "array_length_m": 1.6, "element_spacing_m": 0.02, "array_height_m": 2.0,
+    "transmitter": (0.5, -0.1, 2.1), "baseline_m": 0.3, "baseline_angle_deg": 60.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("between", ["transmitters", "receivers"])
+def test_an_array_has_one_end_that_stands_still(between):
+    antennas = trajectory.switched_array(baseline_between=between, **ARRAY)
+    still, elements = antennas["transmitter"].values, antennas["receiver"].values
+    np.testing.assert_array_equal(still, np.broadcast_to(still[:, :1], still.shape))
+    np.testing.assert_allclose(still[0, 0], [0.5, -0.1, 2.1])
+    line = np.linspace(-0.8, 0.8, 81)[:, None] * [1, 0, 0] + [0, 0, 2.0]
+    np.testing.assert_allclose(elements[0], line, atol=1e-12)
+    step = [0.0, 0.15, 0.15 * np.sqrt(3)]
+    apart, common = (still, elements) if between == "transmitters" else (elements, still)
+    np.testing.assert_allclose(apart[1] - apart[0], np.tile(step, (81, 1)), atol=1e-12)
+    np.testing.assert_array_equal(common[0], common[1])
+
+
+@pytest.mark.parametrize("system", ["rail", "transmit_pair", "receive_pair"])
+def test_the_configuration_names_the_arrangement(system):
+    study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
+    lower, upper = trajectory.apertures(
+        trajectory.planned(study.radar.model_copy(update={"system": system}))
+    )
+    place = [0.0, 0.0, 2.0 if system == "rail" else 2.1]
+    np.testing.assert_allclose(lower.transmitter, place, atol=1e-12)
+    np.testing.assert_allclose(lower.receiver, [0.0, 0.0, 2.0], atol=1e-12)
+    moved = upper.transmitter - lower.transmitter, upper.receiver - lower.receiver
+    between = {"rail": (0.3, 0.3), "transmit_pair": (0.3, 0.0), "receive_pair": (0.0, 0.3)}
+    np.testing.assert_allclose([step[2] for step in moved], between[system], atol=1e-12)
 
 
 def test_apertures_are_the_lines_of_each_channel(rail, bistatic):

@@ -173,6 +173,36 @@ def test_what_is_unwise_is_said_and_allowed(change, says):
     assert says in sentence
 
 
+ARRAY = {"radar__system": "transmit_pair", "outputs__claims": False}
+
+
+def test_an_array_may_have_elements_as_wide_apart_as_it_images_without_ambiguity():
+    # Twice the 1.83 cm of a rail: sines of 2.9 / sqrt(2.9^2 + 10^2 + 2^2) on either side, 2 cm.
+    assert (
+        validation.advice(validation.check(changed(radar__position_spacing_m=0.02, **ARRAY))) == []
+    )
+    (sentence,) = validation.advice(
+        validation.check(changed(radar__position_spacing_m=0.04, **ARRAY))
+    )
+    assert "wider than 0.0365 m: grating lobes" in sentence
+
+
+def test_a_baseline_between_transmitters_may_be_twice_as_long():
+    quarter = {"radar__baseline_m": 3.5}
+    assert len(validation.advice(validation.check(changed(**quarter)))) == 1
+    assert validation.advice(validation.check(changed(**quarter, **ARRAY))) == []
+
+
+def test_claims_are_those_of_a_rail():
+    found = faults(changed(radar__system="receive_pair"))
+    assert "those of a rail" in found["outputs.claims"]
+
+
+def test_a_transmitter_in_the_scene_is_refused():
+    found = faults(changed(radar__transmitter_y_m=10.0, **ARRAY))
+    assert "look ahead" in found["scene.y_min_m"]
+
+
 MOVING = {
     "forward_speed_m_per_s": 10.0, "scan_duration_s": 0.1, "speed_correction": "exact",
     "speed_error_m_per_s": 0.0,
