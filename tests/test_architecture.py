@@ -12,8 +12,14 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "vinsar"
-PROCESSING = ("imaging", "interferogram", "filtering", "unwrapping", "height")
-TRUTH = {"vinsar.scene", "vinsar.visibility", "vinsar.echo", "vinsar.accuracy"}
+PROCESSING = ("imaging", "interferogram", "filtering", "unwrapping", "height", "detection")
+TRUTH = {
+    "vinsar.scene",
+    "vinsar.visibility",
+    "vinsar.echo",
+    "vinsar.accuracy",
+    "vinsar.detection_accuracy",
+}
 
 
 def module_name(path):

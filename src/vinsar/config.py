@@ -409,6 +409,36 @@ class Height(Section):
     )
 
 
+class Detection(Section):
+    """Detection of obstacles and holes on the heights, and on an image alone."""
+
+    threshold_m: float = _key("height or depth from the ground that is an alarm", "ours", gt=0)
+    noise_factor: float = _key(
+        "an alarm exceeds as many standard deviations of the height's noise, as the coherence lets "
+        "expect it; where they exceed the threshold, the ground is unknown",
+        "ours",
+        gt=0,
+    )
+    minimum_area_m2: float = _key("connected area that is an alarm", "ours", gt=0)
+    ground_window_m: float | None = _key(
+        "side of the running median that follows rolling ground; null for a plane alone",
+        "ours",
+        gt=0,
+    )
+    multilook_window_m: float = _key(
+        "side of the window over which the image's power is averaged", "ours", gt=0
+    )
+    background_window_m: float = _key(
+        "side of the window whose median power is that of the surroundings", "ours", gt=0
+    )
+    shadow_level_db: float = _key(
+        "power relative to the surroundings below which the ground is unknown", "ours", lt=0
+    )
+    amplitude_threshold_db: float = _key(
+        "power relative to the surroundings that is an alarm of the image alone", "ours", gt=0
+    )
+
+
 class Accuracy(Section):
     """What the height errors are held against."""
 
@@ -546,6 +576,7 @@ class Study(Section):
     filtering: Filtering
     unwrapping: Unwrapping
     height: Height
+    detection: Detection
     accuracy: Accuracy
     registration: Registration
     baseline_errors: BaselineErrors
@@ -591,7 +622,16 @@ class Study(Section):
                 parts[name] = value
         for section, keys in single.items():
             kind = cast("type[Section]", cls.model_fields[section].annotation)
-            parts[section] = kind.model_construct(**keys)
+            made = {
+                # A list may hold models; plain values are what they are.
+                key: TypeAdapter[Any](kind.model_fields[key].rebuild_annotation()).validate_python(
+                    value
+                )
+                if isinstance(value, list)
+                else value
+                for key, value in keys.items()
+            }
+            parts[section] = kind.model_construct(**made)
         return cls.model_construct(**parts)
 
     def values(self, names: Iterable[str]) -> dict[str, Any]:
@@ -600,6 +640,9 @@ class Study(Section):
         for name in names:
             section, _, key = name.partition(".")
             value = getattr(self, section)
+            if key and isinstance(getattr(value, key), tuple):
+                result[name] = value.model_dump(mode="json", include={key})[key]
+                continue
             if key:
                 value = getattr(value, key)
             if isinstance(value, dict):

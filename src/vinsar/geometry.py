@@ -300,3 +300,30 @@ def printed_height(
     look = np.asarray(look)
     range_ = (path**2 - baseline_m**2) / (2 * baseline_m * np.sin(baseline_angle - look) - path)
     return antenna_height - range_ * np.cos(look)
+
+
+def fit_plane(x: Floats, y: Floats, z: Floats, *, least_residual: float) -> Floats:
+    """Fit a plane by least absolute deviations: single bad points do not count.
+
+    By least squares, reweighted with the inverse of the residuals.
+
+    Parameters
+    ----------
+    x, y, z
+        Points (point,).
+    least_residual
+        Residual below which the weight grows no more, in the unit of z.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Value at the origin, slope along x, slope along y.
+    """
+    design = np.stack([np.ones_like(x), x, y], axis=1)
+    weights: Floats = np.ones(z.size)
+    solution: Floats = np.zeros(3)
+    for _ in range(50):
+        root = np.sqrt(weights)
+        solution, *_ = np.linalg.lstsq(design * root[:, None], z * root, rcond=None)
+        weights = 1 / np.maximum(np.abs(z - design @ solution), least_residual)
+    return solution

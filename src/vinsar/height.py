@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vinsar import aperture, trajectory, variables
+from vinsar import aperture, geometry, trajectory, variables
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +21,9 @@ logger = logging.getLogger(__name__)
 
 Trend = Literal["constant", "plane"]
 Extent = tuple[float, float, float, float]
+
+# Residual below which a reference point gains no more weight in the fit of a plane, rad.
+_LEAST_RESIDUAL = 1e-3
 
 
 def level_ground(
@@ -115,20 +118,10 @@ def phase_offset(
         return np.full((y.size, x.size), np.median(missing))
     if len(missing) < 3:
         raise ValueError(f"a plane needs three or more reference points, not {len(missing)}")
-    design = np.stack([np.ones_like(image_x), image_x, image_y - y[0]], axis=1)
-    constant, slope_x, slope_y = _least_absolute(design, missing)
+    constant, slope_x, slope_y = geometry.fit_plane(
+        image_x, image_y - y[0], missing, least_residual=_LEAST_RESIDUAL
+    )
     return np.asarray(constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0]))
-
-
-def _least_absolute(design: Floats, values: Floats) -> Floats:
-    # Iteratively reweighted least squares; its weights are bounded at a milliradian.
-    weights: Floats = np.ones(values.size)
-    solution: Floats = np.zeros(design.shape[1])
-    for _ in range(50):
-        root = np.sqrt(weights)
-        solution, *_ = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)
-        weights = 1 / np.maximum(np.abs(values - design @ solution), 1e-3)
-    return solution
 
 
 def code_dem(

@@ -17,6 +17,8 @@ from vinsar import (
     accuracy,
     baseline,
     config,
+    detection,
+    detection_accuracy,
     echo,
     filtering,
     geometry,
@@ -157,6 +159,20 @@ def _recorded_trajectory(products: Products, study: config.Study) -> xr.Dataset:
     )
 
 
+def _roughness(products: Products, study: config.Study) -> xr.Dataset:
+    del products
+    return scene.roughness(
+        x_min_m=study.scene.x_min_m,
+        x_max_m=study.scene.x_max_m,
+        y_min_m=study.scene.y_min_m,
+        y_max_m=study.scene.y_max_m,
+        spacing_m=study.scene.terrain_spacing_m,
+        std_m=study.scene.roughness_std_m,
+        correlation_m=study.scene.roughness_correlation_m,
+        rng=_rng(study, _ROUGHNESS),
+    )
+
+
 def _terrain(products: Products, study: config.Study) -> xr.Dataset:
     options = study.scene
     if options.terrain == "file":
@@ -173,12 +189,7 @@ def _terrain(products: Products, study: config.Study) -> xr.Dataset:
             reflectivity_offset=options.reflectivity_offset,
         )
     return scene.furnish(
-        ground,
-        objects=options.objects,
-        patches=options.patches,
-        roughness_std_m=options.roughness_std_m,
-        roughness_correlation_m=options.roughness_correlation_m,
-        rng=_rng(study, _ROUGHNESS),
+        ground, products["roughness"], objects=options.objects, patches=options.patches
     )
 
 
@@ -341,6 +352,25 @@ def _dem(products: Products, study: config.Study) -> xr.Dataset:
     return height.invert(products["unwrapped"], products["images"], offset)
 
 
+def _detections(products: Products, study: config.Study) -> xr.Dataset:
+    return detection.detect(
+        products["dem"],
+        products["images"],
+        products["interferogram"],
+        options=study.detection,
+        looks=looks(products["trajectory"], study),
+    )
+
+
+def _detection_accuracy(products: Products, study: config.Study) -> xr.Dataset:
+    return detection_accuracy.evaluate(
+        products["detections"],
+        products["truth"],
+        study.scene.objects,
+        options=study.detection,
+    )
+
+
 def _accuracy(products: Products, study: config.Study) -> xr.Dataset:
     return accuracy.evaluate(
         products["dem"], products["truth"], tolerance_m=study.accuracy.tolerance_m
@@ -452,9 +482,26 @@ _GRID = (
     "imaging.y_max_m",
     "imaging.grid_spacing_m",
 )
+_LOOKS = (*_WAVEFORM, *_GRID, "interferogram")
 
 STAGES: dict[str, Stage] = {
-    "terrain": Stage(_terrain, (), (*_DRAWS, "scene"), ("scene",), optional=("elevation",)),
+    # By itself, so that without roughness the terrain does not depend on what is drawn.
+    "roughness": Stage(
+        _roughness,
+        (),
+        (
+            *_DRAWS,
+            "scene.x_min_m",
+            "scene.x_max_m",
+            "scene.y_min_m",
+            "scene.y_max_m",
+            "scene.terrain_spacing_m",
+            "scene.roughness_std_m",
+            "scene.roughness_correlation_m",
+        ),
+        ("scene",),
+    ),
+    "terrain": Stage(_terrain, ("roughness",), ("scene",), ("scene",), optional=("elevation",)),
     "facets": Stage(
         _facets,
         ("terrain",),
@@ -539,10 +586,22 @@ STAGES: dict[str, Stage] = {
     "unwrapped": Stage(
         _unwrapped,
         ("filtered", "interferogram", "trajectory"),
-        (*_WAVEFORM, *_GRID, "interferogram", "unwrapping"),
+        (*_LOOKS, "unwrapping"),
         ("unwrapping", "radar", "trajectory"),
     ),
     "dem": Stage(_dem, ("unwrapped", "images"), ("height",), ("height",)),
+    "detections": Stage(
+        _detections,
+        ("dem", "images", "interferogram", "trajectory"),
+        (*_LOOKS, "detection"),
+        ("detection", "radar", "trajectory"),
+    ),
+    "detection_accuracy": Stage(
+        _detection_accuracy,
+        ("detections", "truth"),
+        ("scene.objects", "detection"),
+        ("detection_accuracy",),
+    ),
     "accuracy": Stage(_accuracy, ("dem", "truth"), ("accuracy",), ("accuracy",)),
     "focus": Stage(
         _focus,

@@ -220,8 +220,16 @@ def _bilinear(values: Floats, row: Floats, column: Floats) -> Floats:
 
 
 def roughness(
-    x: Floats, y: Floats, *, std_m: float, correlation_m: float, rng: np.random.Generator
-) -> Floats:
+    *,
+    x_min_m: float,
+    x_max_m: float,
+    y_min_m: float,
+    y_max_m: float,
+    spacing_m: float,
+    std_m: float,
+    correlation_m: float,
+    rng: np.random.Generator,
+) -> xr.Dataset:
     """Return a random field with a Gaussian autocorrelation.
 
     White noise under a Gaussian of the standard deviation ``s`` is correlated as
@@ -229,8 +237,10 @@ def roughness(
 
     Parameters
     ----------
-    x, y
-        Axes of the raster, m.
+    x_min_m, x_max_m, y_min_m, y_max_m
+        Extent, m.
+    spacing_m
+        Spacing of the raster, m.
     std_m
         Standard deviation of the field, not of its sample on this raster, m.
     correlation_m
@@ -240,17 +250,23 @@ def roughness(
 
     Returns
     -------
-    ndarray, shape (y, x)
-        Heights, m.
+    xarray.Dataset
+        Product ``roughness``: ``height`` (y, x), of the four corners alone if it is 0 everywhere.
     """
     from scipy.ndimage import gaussian_filter
 
-    sigma = [correlation_m / 2 / float(axis[1] - axis[0]) for axis in (y, x)]
+    if std_m == 0:
+        corners = {"x": np.array([x_min_m, x_max_m]), "y": np.array([y_min_m, y_max_m])}
+        return variables.dataset("roughness", {"height": np.zeros((2, 2))}, corners)
+    x = geometry.grid_axis(x_min_m, x_max_m, spacing_m)
+    y = geometry.grid_axis(y_min_m, y_max_m, spacing_m)
+    sigma = correlation_m / 2 / spacing_m
     impulse = np.zeros((y.size, x.size))
     impulse[y.size // 2, x.size // 2] = 1
     gain = np.sqrt((gaussian_filter(impulse, sigma, mode="wrap") ** 2).sum())
     white = rng.normal(size=impulse.shape)
-    return np.asarray(std_m / gain * gaussian_filter(white, sigma, mode="wrap"))
+    height = std_m / gain * gaussian_filter(white, sigma, mode="wrap")
+    return variables.dataset("roughness", {"height": height}, {"x": x, "y": y})
 
 
 def _inside(part: Any, x: Floats, y: Floats) -> Flags:
@@ -294,27 +310,21 @@ def relief(part: config.SceneObject, x: Floats, y: Floats) -> Floats:
 
 def furnish(
     terrain: xr.Dataset,
+    roughness: xr.Dataset,
     *,
     objects: Sequence[config.SceneObject],
     patches: Sequence[config.Patch],
-    roughness_std_m: float,
-    roughness_correlation_m: float,
-    rng: np.random.Generator,
 ) -> xr.Dataset:
     """Put roughness, patches and objects on a terrain.
 
     Parameters
     ----------
-    terrain
-        Product ``terrain``.
+    terrain, roughness
+        Products of these names.
     objects
         Obstacles and holes; where they overlap, their heights add up.
     patches
         Ground of other reflectivity; a later one covers an earlier one, objects cover them all.
-    roughness_std_m, roughness_correlation_m
-        As in `roughness`; no roughness for a standard deviation of 0.
-    rng
-        Source of randomness of the roughness.
 
     Returns
     -------
@@ -323,10 +333,9 @@ def furnish(
     """
     x, y = terrain["x"].values, terrain["y"].values
     height, reflectivity = terrain["height"].values.copy(), terrain["reflectivity"].values.copy()
-    if roughness_std_m > 0:
-        height += roughness(
-            x, y, std_m=roughness_std_m, correlation_m=roughness_correlation_m, rng=rng
-        )
+    if roughness["height"].values.any():
+        grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
+        height += sample(roughness["height"], grid_x, grid_y)
     # ASSUME: the reflectivity follows the height of the terrain alone, not that of its roughness
     # and of the objects.
     across, ahead = x[None, :], y[:, None]

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from vinsar import blocks, config, pipeline, validation, variables
+from vinsar import blocks, config, detection_accuracy, pipeline, validation, variables
 from vinsar.constants import CHANNELS
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ _LEAST_BLOCKS = 64
 _SMALL_BYTES = 1 << 16
 
 _RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
+_OF_OBJECTS = "detection_accuracy"
 _STATISTICS = tuple(name for name, own in variables.SWEEP.items() if own.dims == ("region",))
 _UNITS = {"m_per_s": "m s-1", "m": "m", "s": "s", "hz": "Hz", "db": "dB", "deg": "degree"}
 
@@ -100,11 +101,32 @@ def _text(value: Any) -> str:
     return json.dumps(value, sort_keys=True, default=str)
 
 
-def declared() -> list[str]:
-    """Return every key of the configuration that the stages of a case declare."""
-    return list(
-        dict.fromkeys(name for s in pipeline.needed(_RESULTS).values() for name in s.sections)
-    )
+def _results(scene: config.Scene) -> tuple[str, ...]:
+    """Return the products that a case is judged by: how well objects are found, if it has any."""
+    return (*_RESULTS, _OF_OBJECTS) if scene.objects else _RESULTS
+
+
+def _stages(study: config.Study, name: str) -> dict[str, pipeline.Stage]:
+    return pipeline.needed(_results(config.swept_section(study, name, "scene")))
+
+
+def declared(study: config.Study, name: str) -> list[str]:
+    """Return every key of the configuration that the stages of a sweep's cases declare.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+
+    Returns
+    -------
+    list of str
+        Sections and single keys.
+    """
+    stages = _stages(study, name).values()
+    return list(dict.fromkeys(key for stage in stages for key in stage.sections))
 
 
 def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config.Study]]:
@@ -127,7 +149,7 @@ def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config
     validation.ConfigurationError
         If a swept key changes nothing, or one of them is not a valid study.
     """
-    _refuse_idle(name, study.sweeps[name])
+    _refuse_idle(study, name)
     return [
         (changes, _share(case, study)) for changes, case in validation.sweep_studies(study, name)
     ]
@@ -156,9 +178,9 @@ def cases(study: config.Study, name: str, *given: str) -> list[Case]:
         If a swept key changes nothing, or any case is not a valid study; nothing has run then.
     """
     sweep = study.sweeps[name]
-    names = declared()
+    names = declared(study, name)
     shape = [len(values) for values in sweep.over.values()]
-    sections = [stage.sections for stage in pipeline.needed(_RESULTS).values()]
+    sections = [stage.sections for stage in _stages(study, name).values()]
     # What the first stages read changes slowest, so that few of their products are kept at a time.
     seen: list[dict[str, int]] = [{} for _ in sections]
     found = []
@@ -177,14 +199,19 @@ def cases(study: config.Study, name: str, *given: str) -> list[Case]:
     return [case for _, case in found]
 
 
-def _refuse_idle(name: str, sweep: config.Sweep) -> None:
+def _refuse_idle(study: config.Study, name: str) -> None:
     """Refuse swept keys that no stage of a case reads, and values that stand there twice."""
     faults = []
-    read = [f"{key}." for key in declared()]
-    for key, values in sweep.over.items():
+    read = [f"{key}." for key in declared(study, name)]
+    for key, values in study.sweeps[name].over.items():
         where = f"sweeps.{name}.over.{key}"
         if key == "realization":
             advice = f"is counted by sweeps.{name}.realizations; take it out of `over`"
+            faults.append(validation.Fault(where, None, advice))
+        elif key == "scene.objects":
+            advice = (
+                "must be the same in all cases; put them into scene.objects or the sweep's base"
+            )
             faults.append(validation.Fault(where, None, advice))
         # A key that is not there at all is for the check of the cases, which says what was meant.
         elif key in validation.every_key() and not any(
@@ -388,17 +415,20 @@ def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -
     -------
     dict
         The statistics by region, the median coherence on visible ground, the residues, and the
-        focus by channel, in plain numbers.
+        focus by channel; if the scene has objects, how well they are found; in plain numbers.
     """
     memo = memo or _MEMO
     with blocks.serially():
-        products = memo.products(_RESULTS, case.study, given)
+        products = memo.products(_results(case.study.scene), case.study, given)
     accuracy, interferogram, unwrapped, focus, truth = (products[name] for name in _RESULTS)
     row: Row = {name: accuracy[name].values.tolist() for name in _STATISTICS}
     visible = ~truth["shadow"].values
     row["coherence"] = float(np.median(interferogram["coherence"].values[visible]))
     row["residues"] = int(np.abs(unwrapped["residue"].values).sum())
     row |= {str(name): values.values.tolist() for name, values in focus.data_vars.items()}
+    if _OF_OBJECTS in products:
+        found = products[_OF_OBJECTS].data_vars
+        row |= {str(name): values.values.tolist() for name, values in found.items()}
     return row
 
 
@@ -515,4 +545,11 @@ def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Ro
         texts = [value if isinstance(value, str) else _text(value) for value in listed]
         labels = np.asarray(listed if numeric else texts)
         swept[dimension(key)] = (labels, attrs)
-    return variables.sweep_dataset(data, swept)
+    coords = {}
+    if "height_found" in data:
+        coords = {
+            "height_threshold": detection_accuracy.HEIGHT_THRESHOLDS,
+            "amplitude_threshold": detection_accuracy.AMPLITUDE_THRESHOLDS,
+            "object": np.arange(data["object_height"].shape[-1]),
+        }
+    return variables.sweep_dataset(data, swept, coords)

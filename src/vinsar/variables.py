@@ -103,6 +103,14 @@ COORDINATES: dict[str, Variable] = {
     "baseline_angle": Variable(
         ("baseline_angle",), "real", "radian", "attitude of the baseline from horizontal"
     ),
+    "detection": Variable(("detection",), "integer", "1", "number of the detected area"),
+    "object": Variable(("object",), "integer", "1", "number of the object of the scene"),
+    "height_threshold": Variable(
+        ("height_threshold",), "real", "m", "threshold of the height detector"
+    ),
+    "amplitude_threshold": Variable(
+        ("amplitude_threshold",), "real", "1", "threshold of the 2-D detector, a power ratio"
+    ),
     "realization": Variable(("realization",), "integer", "1", "number of the realization"),
 }
 
@@ -124,6 +132,7 @@ _TERRAIN = {
     "height": Variable(_GRID, "real", "m", "true height above the ground plane"),
     "reflectivity": Variable(_GRID, "real", "1", "reflectivity of the scene"),
 }
+_DETECTED, _OBJECT = ("detection",), ("object",)
 _ECHO = {
     "echo": Variable(
         ("channel", "position", "frequency"),
@@ -138,6 +147,9 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
     "trajectory": _ANTENNAS,
     "true_trajectory": _ANTENNAS,
     "recorded_trajectory": _ANTENNAS,
+    "roughness": {
+        "height": Variable(_GRID, "real", "m", "random roughness of the ground"),
+    },
     "elevation": _TERRAIN,
     "terrain": _TERRAIN,
     "facets": {
@@ -226,6 +238,95 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
         "phase_offset": Variable(
             _GRID, "real", "radian", "phase added to fit the reference heights"
         ),
+    },
+    "detections": {
+        "ground": Variable(_GRID, "real", "m", "height of the ground beneath obstacles"),
+        "height_above_ground": Variable(
+            _GRID, "real", "m", "reconstructed height above the ground beneath", "negative in holes"
+        ),
+        "height_noise": Variable(
+            _GRID, "real", "m", "standard deviation of the height expected from the coherence"
+        ),
+        "significant_height": Variable(
+            _GRID,
+            "real",
+            "m",
+            "height above the ground beneath where it exceeds its noise",
+            "0 where it does not, not a number where the image is dark",
+        ),
+        "map_class": Variable(
+            _GRID,
+            "integer",
+            "1",
+            "what the ground is taken for",
+            "0 free, 1 obstacle, 2 hole, 3 unknown: dark, or too noisy to tell",
+        ),
+        "contrast": Variable(
+            _GRID,
+            "real",
+            "1",
+            "multilooked power of the images over that of their surroundings",
+            "at the image's pixel, before DEM coding",
+        ),
+        "bright": Variable(
+            _GRID,
+            "flag",
+            "1",
+            "alarm of the 2-D detector, which sees the images' power alone",
+            flag_meanings="quiet alarm",
+        ),
+        "detected_x": Variable(_DETECTED, "real", "m", "centre of the detected area along x"),
+        "detected_y": Variable(_DETECTED, "real", "m", "centre of the detected area along y"),
+        "extent_x": Variable(_DETECTED, "real", "m", "extent of the detected area along x"),
+        "extent_y": Variable(_DETECTED, "real", "m", "extent of the detected area along y"),
+        "detected_area": Variable(_DETECTED, "real", "m2", "detected area"),
+        "detected_height": Variable(
+            _DETECTED,
+            "real",
+            "m",
+            "height of the detected area",
+            "what a tenth of it exceeds; negative for a hole",
+        ),
+    },
+    "detection_accuracy": {
+        "object_x": Variable(_OBJECT, "real", "m", "centre of the object along x"),
+        "object_y": Variable(_OBJECT, "real", "m", "centre of the object along y"),
+        "object_height": Variable(
+            _OBJECT, "real", "m", "height of the object", "negative for a ditch or pit"
+        ),
+        "height_found": Variable(
+            ("height_threshold", "object"),
+            "flag",
+            "1",
+            "object found by the height detector",
+            flag_meanings="missed found",
+        ),
+        "height_false_alarms": Variable(
+            ("height_threshold",), "integer", "1", "false alarms of the height detector"
+        ),
+        "amplitude_found": Variable(
+            ("amplitude_threshold", "object"),
+            "flag",
+            "1",
+            "object found by the 2-D detector",
+            flag_meanings="missed found",
+        ),
+        "amplitude_false_alarms": Variable(
+            ("amplitude_threshold",), "integer", "1", "false alarms of the 2-D detector"
+        ),
+        "object_unknown": Variable(
+            _OBJECT, "real", "1", "share of the object's ground that the map has as unknown"
+        ),
+        "object_free": Variable(
+            _OBJECT, "real", "1", "share of the object's ground that the map has as free"
+        ),
+        "shadow_unknown": Variable(
+            (), "real", "1", "share of the true shadow that the map has as unknown"
+        ),
+        "visible_unknown": Variable(
+            (), "real", "1", "share of visible ground beside objects that the map has as unknown"
+        ),
+        "scene_area": Variable((), "real", "m2", "area of the map"),
     },
     "focus": {
         "point_gain": Variable(
@@ -373,6 +474,9 @@ SWEEP: dict[str, Variable] = {
 }
 """Variables of a sweep; the dimensions of the swept keys and of the realization come first."""
 
+SWEEP_OF_OBJECTS: dict[str, Variable] = SWEEP | PRODUCTS["detection_accuracy"]
+"""Variables of a sweep over a scene with objects."""
+
 LABELS: dict[str, tuple[str, ...]] = {"channel": CHANNELS, "axis": AXES, "ground_axis": AXES[:2]}
 
 
@@ -453,16 +557,21 @@ def _make_coordinate(name: str, values: NDArray[Any]) -> _Coordinate:
 
 
 def sweep_dataset(
-    data: Mapping[str, Any], swept: Mapping[str, tuple[Any, dict[str, str]]]
+    data: Mapping[str, Any],
+    swept: Mapping[str, tuple[Any, dict[str, str]]],
+    coords: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """Make a sweep's product.
 
     Parameters
     ----------
     data
-        An array for each variable of `SWEEP`: swept keys, realization, then its own dimensions.
+        An array for each variable of `SWEEP`, or of `SWEEP_OF_OBJECTS`: swept keys, realization,
+        then its own dimensions.
     swept
         Values and attributes of each swept key's dimension, in order.
+    coords
+        The coordinates' values of dimensions that are neither region nor channel.
 
     Returns
     -------
@@ -472,16 +581,17 @@ def sweep_dataset(
     result = xr.Dataset()
     leading = (*swept, "realization")
     for name, values in data.items():
-        result[name] = ((*leading, *SWEEP[name].dims), values, SWEEP[name].attrs)
+        variable = SWEEP_OF_OBJECTS[name]
+        result[name] = ((*leading, *variable.dims), values, variable.attrs)
     for name, (labels, attrs) in swept.items():
         result = result.assign_coords({name: (name, labels, attrs)})
-    coords = {
+    own = {
         "realization": np.arange(result.sizes["realization"]),
         "region": np.array(REGIONS),
         "channel": np.array(CHANNELS),
         "ground_axis": np.array(LABELS["ground_axis"]),
     }
-    for name, labels in coords.items():
+    for name, labels in (own | dict(coords or {})).items():
         result = result.assign_coords({name: (name, labels, COORDINATES[name].attrs)})
     return result
 
@@ -506,7 +616,8 @@ def swept(data: xr.Dataset, *dims: str) -> xr.Dataset:
     ValueError
         If the sweep does not go over one of them.
     """
-    own = {"realization", *(dim for variable in SWEEP.values() for dim in variable.dims)}
+    declared = SWEEP_OF_OBJECTS.values()
+    own = {"realization", *(dim for variable in declared for dim in variable.dims)}
     keys = [str(dim) for dim in data.dims if dim not in own]
     missing = [dim for dim in dims if dim not in keys]
     if missing:
@@ -566,9 +677,12 @@ def check(data: xr.Dataset, product: str) -> None:
 
 def _check_sweep(data: xr.Dataset) -> None:
     found = {str(name) for name in data.data_vars}
-    if found != set(SWEEP):
-        raise ValueError(f"product 'sweep' holds {sorted(found)}, but {sorted(SWEEP)} are declared")
-    for name, variable in SWEEP.items():
+    declared = SWEEP_OF_OBJECTS if found - set(SWEEP) else SWEEP
+    if found != set(declared):
+        raise ValueError(
+            f"product 'sweep' holds {sorted(found)}, but {sorted(declared)} are declared"
+        )
+    for name, variable in declared.items():
         dims = data[name].dims
         own = len(variable.dims)
         if dims[len(dims) - own :] != variable.dims or "realization" not in dims:

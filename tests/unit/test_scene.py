@@ -180,11 +180,23 @@ def test_facets_larger_than_the_terrain_are_one_facet():
 
 
 OBJECT = TypeAdapter(config.SceneObject)
-FLAT = {"roughness_std_m": 0.0, "roughness_correlation_m": 0.2, "objects": (), "patches": ()}
 
 
-def furnish(terrain, seed=3, **changes):
-    return scene.furnish(terrain, rng=np.random.default_rng(seed), **(FLAT | changes))
+def rough(std_m=0.0, correlation_m=0.2, seed=3):
+    return scene.roughness(
+        x_min_m=-2.5,
+        x_max_m=2.5,
+        y_min_m=10.0,
+        y_max_m=16.0,
+        spacing_m=0.02,
+        std_m=std_m,
+        correlation_m=correlation_m,
+        rng=np.random.default_rng(seed),
+    )
+
+
+def furnish(terrain, objects=(), patches=()):
+    return scene.furnish(terrain, rough(), objects=objects, patches=patches)
 
 
 def test_nothing_added_leaves_the_terrain_as_it_is(peaks):
@@ -267,9 +279,8 @@ def test_reflectivity_is_that_of_patches_and_objects_and_has_no_height():
 
 
 def test_roughness_has_its_spread_and_its_correlation():
-    terrain = make("flat", spacing_m=0.02)
     std, length = 0.02, 0.1
-    height = furnish(terrain, roughness_std_m=std, roughness_correlation_m=length)["height"].values
+    height = rough(std, length)["height"].values
     # The field has some 5 * 6 / (2 pi (l / 2)^2) = 1900 independent cells, so that its standard
     # deviation is known to 1 / sqrt(2 * 1900) = 1.6 %; three times that.
     assert height.std() == pytest.approx(std, rel=0.05)
@@ -277,9 +288,19 @@ def test_roughness_has_its_spread_and_its_correlation():
         expected = np.exp(-((lag * 0.02 / length) ** 2))
         for pair in ((height[lag:], height[:-lag]), (height[:, lag:], height[:, :-lag])):
             assert (pair[0] * pair[1]).mean() / std**2 == pytest.approx(expected, abs=0.07)
-    assert np.array_equal(
-        height, furnish(terrain, roughness_std_m=std, roughness_correlation_m=length)["height"]
-    )
+    assert np.array_equal(height, rough(std, length)["height"])
+    assert not np.allclose(height, rough(std, length, seed=4)["height"])
+
+
+def test_roughness_is_added_to_the_terrain_and_leaves_its_reflectivity(peaks):
+    field = rough(0.02, 0.3)
+    found = scene.furnish(peaks, field, objects=(), patches=())
+    np.testing.assert_allclose(found["height"] - peaks["height"], field["height"], atol=1e-12)
+    assert found["reflectivity"].identical(peaks["reflectivity"])
+    # A raster twice as fine has it in between.
+    fine = scene.furnish(make("flat", spacing_m=0.01), field, objects=(), patches=())["height"]
+    between = (field["height"].values[:, 1:] + field["height"].values[:, :-1]) / 2
+    np.testing.assert_allclose(fine.values[::2, 1::2], between, atol=1e-12)
 
 
 def test_walls_have_facets_by_their_surface_and_gentle_ground_by_its_area(peaks):

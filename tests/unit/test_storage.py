@@ -139,3 +139,21 @@ def test_what_cannot_reach_the_disk_takes_no_name(tmp_path, monkeypatch):
     with pytest.raises(OSError, match=r"cannot write .*a\.nc: No space left on device"):
         storage.write(images(), tmp_path / "a.nc", "images")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_map_without_a_detection_comes_back(tmp_path):
+    shape = (3, 4)
+    data = {
+        name: np.zeros(shape if variable.dims else (), variables.DTYPES[variable.kind][0])
+        for name, variable in variables.PRODUCTS["detections"].items()
+        if variable.dims == ("y", "x")
+    } | {
+        name: np.zeros(0)
+        for name, variable in variables.PRODUCTS["detections"].items()
+        if variable.dims == ("detection",)
+    }
+    axes = {"y": np.arange(3.0), "x": np.arange(4.0)}
+    found = variables.dataset("detections", data, axes)
+    storage.write(found, tmp_path / "detections.nc", "detections")
+    back = storage.read(tmp_path / "detections.nc", "detections")
+    xr.testing.assert_identical(back.drop_attrs(deep=False), found)

@@ -368,3 +368,33 @@ def test_few_cases_are_spread_and_many_are_bundled():
         assert [case for block in blocks for case in block] == list(range(count))
         sizes[count] = len(blocks[0])
     assert sizes == {1: 1, 64: 1, 640: 10, 5000: sweep.CASES_PER_BLOCK}
+
+
+def with_objects(study):
+    box = {"shape": "box", "x_m": 0, "y_m": 11, "size_x_m": 0.4, "size_y_m": 0.4, "height_m": 0.2}
+    scene = study.scene.model_dump() | {"terrain": "flat", "objects": [box]}
+    return study.model_copy(update={"scene": config.Scene.model_validate(scene)})
+
+
+def test_a_scene_with_objects_is_swept_with_how_well_they_are_found(tiny, tmp_path):
+    over = {"detection.noise_factor": [3.0, 1e6]}
+    found = run(with_sweep(with_objects(tiny), over, realizations=2))
+    assert found["height_found"].dims == (
+        "detection_noise_factor", "realization", "height_threshold", "object",
+    )  # fmt: skip
+    rate = found["height_found"].sel(height_threshold=0.05, method="nearest").mean("realization")
+    # Nothing exceeds a million times its noise.
+    assert rate.values[:, 0].tolist() == [1.0, 0.0]
+    assert (found["object_height"] == 0.2).all()
+    path = tmp_path / "sweep.nc"
+    storage.write(found, path, "sweep")
+    xr.testing.assert_identical(storage.read(path, "sweep").drop_attrs(), found.drop_attrs())
+    # Without objects nothing of the detection is read.
+    with pytest.raises(validation.ConfigurationError, match="no stage of a case reads it"):
+        run(with_sweep(tiny, over))
+
+
+def test_objects_themselves_are_not_swept(tiny):
+    over = {"scene.objects": [[], [{"shape": "pit"}]]}
+    with pytest.raises(validation.ConfigurationError, match="must be the same in all cases"):
+        run(with_sweep(with_objects(tiny), over))

@@ -97,7 +97,8 @@ def checked_sweep(name):
 
 def sweep_configuration(wildcards):
     """What a sweep's cases read: not how figures look, where it runs, nor other sweeps."""
-    return configuration(*sweep.declared()) | {"sweep": checked_sweep(wildcards.sweep)}
+    checked = {"sweep": checked_sweep(wildcards.sweep)}
+    return configuration(*sweep.declared(STUDY, wildcards.sweep)) | checked
 
 
 def wanted_products():

@@ -48,8 +48,24 @@ rule recorded_trajectory:
         "../scripts/stage.py"
 
 
+rule roughness:
+    input:
+        code=stage_sources("roughness"),
+    output:
+        "<results>/roughness.nc",
+    log:
+        "<logs>/roughness.log",
+    benchmark:
+        "<benchmarks>/roughness.tsv"
+    params:
+        configuration=stage_configuration("roughness"),
+    script:
+        "../scripts/stage.py"
+
+
 rule terrain:
     input:
+        roughness="<results>/roughness.nc",
         code=stage_sources("terrain"),
     output:
         "<results>/terrain.nc",

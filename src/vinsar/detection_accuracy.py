@@ -1,0 +1,124 @@
+"""How well obstacles and holes are found: the detectors held against the objects of the scene."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar import scene, variables
+from vinsar.detection import FREE, UNKNOWN, regions
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from vinsar import config
+
+    Flags = NDArray[np.bool_]
+    Floats = NDArray[np.floating]
+
+HEIGHT_THRESHOLDS = np.round(np.arange(0.01, 0.401, 0.01), 2)
+"""Thresholds of the height detector's ROC, m."""
+
+AMPLITUDE_THRESHOLDS = 10 ** (np.arange(0.5, 15.01, 0.5) / 10)
+"""Thresholds of the 2-D detector's ROC: power ratios of 0.5 to 15 dB."""
+
+
+def evaluate(
+    detections: xr.Dataset,
+    truth: xr.Dataset,
+    objects: Sequence[config.SceneObject],
+    *,
+    options: config.Detection,
+) -> xr.Dataset:
+    """Count found objects and false alarms over the thresholds of both detectors.
+
+    An object is found if an alarm of its sign lies on it or within a multilook window of it; to the
+    2-D detector, which knows no heights, any alarm will do. A false alarm is a connected area that
+    touches no object so grown. Relief of the terrain itself is no object.
+
+    Parameters
+    ----------
+    detections, truth
+        Products of these names, on one grid.
+    objects
+        The objects of the scene.
+    options
+        Section ``detection`` of the configuration.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``detection_accuracy``.
+    """
+    x, y = detections["x"].values, detections["y"].values
+    spacing = float(x[1] - x[0])
+    footprints = [_footprint(part, x, y) for part in objects]
+    reach = int(np.ceil(options.multilook_window_m / spacing - 1e-6))
+    grown = [_grow(mask, reach) for mask in footprints]
+    anywhere = np.any([np.zeros((y.size, x.size), bool), *grown], axis=0)
+    least = options.minimum_area_m2 / spacing**2
+    signs = [1 if part.shape in {"box", "stump", "mound"} else -1 for part in objects]
+
+    def count(masks: dict[int, Flags]) -> tuple[list[bool], int]:
+        areas = {sign: regions(mask, least) for sign, mask in masks.items()}
+        found = [
+            bool(areas[sign if sign in areas else 0][0][mask].any())
+            for sign, mask in zip(signs, grown, strict=True)
+        ]
+        false = sum(
+            number - np.unique(map_[anywhere & (map_ > 0)]).size for map_, number in areas.values()
+        )
+        return found, false
+
+    height, contrast = detections["significant_height"].values, detections["contrast"].values
+    by_height = [count({1: height > level, -1: height < -level}) for level in HEIGHT_THRESHOLDS]
+    by_amplitude = [count({0: contrast > level}) for level in AMPLITUDE_THRESHOLDS]
+    kind = detections["map_class"].values
+    shadow, exists = truth["shadow"].values, np.isfinite(truth["height"].values)
+    return variables.dataset(
+        "detection_accuracy",
+        {
+            "object_x": np.array([part.x_m for part in objects], float),
+            "object_y": np.array([part.y_m for part in objects], float),
+            "object_height": np.array([_height(part) for part in objects], float),
+            "height_found": _flags([found for found, _ in by_height], len(objects)),
+            "height_false_alarms": np.array([false for _, false in by_height]),
+            "amplitude_found": _flags([found for found, _ in by_amplitude], len(objects)),
+            "amplitude_false_alarms": np.array([false for _, false in by_amplitude]),
+            "object_unknown": np.array([_share(kind == UNKNOWN, mask) for mask in footprints]),
+            "object_free": np.array([_share(kind == FREE, mask) for mask in footprints]),
+            "shadow_unknown": _share(kind == UNKNOWN, shadow),
+            "visible_unknown": _share(kind == UNKNOWN, exists & ~shadow & ~anywhere),
+            "scene_area": exists.sum() * spacing**2,
+        },
+        {"height_threshold": HEIGHT_THRESHOLDS, "amplitude_threshold": AMPLITUDE_THRESHOLDS},
+    )
+
+
+def _footprint(part: config.SceneObject, x: Floats, y: Floats) -> Flags:
+    mask = scene.relief(part, x[None, :], y[:, None]) != 0
+    # The cell of its centre, at least.
+    mask[np.abs(y - part.y_m).argmin(), np.abs(x - part.x_m).argmin()] = True
+    return mask
+
+
+def _grow(mask: Flags, cells: int) -> Flags:
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(mask, np.ones((2 * cells + 1, 2 * cells + 1), bool)))
+
+
+def _height(part: config.SceneObject) -> float:
+    return -part.depth_m if part.shape == "ditch" or part.shape == "pit" else part.height_m
+
+
+def _flags(rows: list[list[bool]], objects: int) -> Flags:
+    return np.array(rows, bool).reshape(len(rows), objects)
+
+
+def _share(mask: Flags, where: Flags) -> float:
+    return float(mask[where].mean()) if where.any() else np.nan

@@ -1,0 +1,37 @@
+# Obstacles and holes on the heights, and how well they are found.
+
+
+rule detections:
+    input:
+        dem="<results>/dem.nc",
+        images="<results>/images.nc",
+        interferogram="<results>/interferogram.nc",
+        trajectory="<results>/trajectory.nc",
+        code=stage_sources("detections"),
+    output:
+        "<results>/detections.nc",
+    log:
+        "<logs>/detections.log",
+    benchmark:
+        "<benchmarks>/detections.tsv"
+    params:
+        configuration=stage_configuration("detections"),
+    script:
+        "../scripts/stage.py"
+
+
+rule detection_accuracy:
+    input:
+        detections="<results>/detections.nc",
+        truth="<results>/truth.nc",
+        code=stage_sources("detection_accuracy"),
+    output:
+        "<results>/detection_accuracy.nc",
+    log:
+        "<logs>/detection_accuracy.log",
+    benchmark:
+        "<benchmarks>/detection_accuracy.tsv"
+    params:
+        configuration=stage_configuration("detection_accuracy"),
+    script:
+        "../scripts/stage.py"
