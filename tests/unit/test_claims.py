@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import claims, pipeline, validation, variables
+from vinsar import claims, detection, pipeline, validation, variables
 
 ROOT = Path(__file__).parents[2]
 
@@ -118,16 +118,38 @@ def test_a_phase_off_by_a_cycle_breaks_the_claim_of_the_unwrapped_phase(products
     )
 
 
-def test_an_obstacle_where_there_is_none_breaks_the_claim_of_no_false_alarm(products, study):
+def test_the_claim_of_no_false_alarm_falls_with_what_the_detector_makes_of_level_ground(
+    products, study
+):
     truth = products["truth"]["height"].values
-    good = verdicts(replaced(products, "dem", height=truth), study)
-    assert good["F4-alarm"].verdict == "reproduced"
-    ghost = truth.copy()
-    ghost[:, :] = np.where(np.abs(truth) > 0.09, truth, 0)
-    ghost[2:12, 2:12] = 0.5
-    assert verdicts(replaced(products, "dem", height=ghost), study)["F4-alarm"].verdict == (
-        "contradicted"
-    )
+    real = np.abs(truth) > claims.OBSTACLE_HEIGHT_M
+    corner = np.zeros(truth.shape, bool)
+    corner[2:6, 2:6] = True
+    assert not real[:10, :10].any()
+
+    def decided(alarm, error, elsewhere=detection.FREE):
+        kind = np.where(alarm, detection.OBSTACLE, elsewhere)
+        changed = replaced(products, "detections", map_class=kind)
+        claim = verdicts(replaced(changed, "accuracy", height_error=error), study)["F4-alarm"]
+        return claim.verdict, claim.figures
+
+    # Relief is reported, and heights err there alone.
+    verdict, figures = decided(real, np.where(real, 0.5, 0))
+    assert verdict == "reproduced"
+    assert figures["detected_areas"] >= 1
+    # Where they err by as much the map has to be cautious.
+    verdict, figures = decided(real & False, np.where(real, 0.5, 0), detection.UNKNOWN)
+    assert verdict == "reproduced"
+    verdict, figures = decided(real & False, np.where(real, 0.5, 0))
+    assert verdict == "partly"
+    assert figures["cells_with_large_error_taken_for_free"] == real.sum()
+    # Level ground errs, unnoticed by the detector; and then noticed.
+    verdict, figures = decided(real, np.where(corner, 0.5, 0))
+    assert verdict == "partly"
+    assert figures["areas_with_large_error_without_obstacle"] == 1
+    verdict, figures = decided(real | corner, 0)
+    assert verdict == "contradicted"
+    assert figures["false_areas"] == 1
 
 
 def test_the_vertical_baseline_is_as_sensitive_as_eq_5_says(products, study):
