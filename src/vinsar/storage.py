@@ -1,7 +1,8 @@
 """Products in netCDF files (CF-1.11): whole or not at all, and refused if they are not ours.
 
 Complex variables are stored as ``<name>_real`` and ``<name>_imag``, flags as int8 with
-``flag_values``: the only forms that every CF tool reads.
+``flag_values``: the only forms that every CF tool reads. CF's coordinate variables are numbers in
+order; other labels of a dimension are an auxiliary coordinate over ``<name>_index``.
 """
 
 from __future__ import annotations
@@ -109,13 +110,20 @@ def write(
                 values.dtype.kind == "f" and np.isnan(values.values).any()
             )
             encoding[name] = {"_FillValue": np.nan if missing else None}
-    stored = stored[sorted(map(str, stored.variables))]
+    labelled = {dim: f"{dim}_index" for dim in data.coords if _is_label(data[dim])}
+    stored = stored.rename_dims(labelled)[sorted(map(str, stored.variables))]
     stored.attrs = {"Conventions": CONVENTIONS, "vinsar_product": product} | dict(attributes or {})
     with atomic(path) as temporary:
         try:
             stored.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
         except RuntimeError as error:  # what netCDF4 makes of a full disk
             raise OSError(f"cannot write {path}: {error}") from error
+
+
+def _is_label(values: xr.DataArray) -> bool:
+    index = values.to_index()
+    ordered = index.is_monotonic_increasing or index.is_monotonic_decreasing
+    return values.dtype.kind in "UOT" or not (ordered and index.is_unique)
 
 
 def read(path: str | Path, product: str) -> xr.Dataset:
@@ -163,6 +171,8 @@ def read(path: str | Path, product: str) -> xr.Dataset:
 
 
 def _restore(stored: xr.Dataset, product: str) -> xr.Dataset:
+    labelled = {f"{name}_index": name for name in stored.coords}
+    stored = stored.swap_dims({dim: labelled[dim] for dim in stored.dims if dim in labelled})
     data = stored.copy()
     for name, variable in variables.PRODUCTS.get(product, {}).items():
         if variable.kind == "complex":

@@ -56,7 +56,10 @@ _SMALL_BYTES = 1 << 16
 _RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
 _OF_OBJECTS = "detection_accuracy"
 _STATISTICS = tuple(name for name, own in variables.SWEEP.items() if own.dims == ("region",))
-_UNITS = {"m_per_s": "m s-1", "m": "m", "s": "s", "hz": "Hz", "db": "dB", "deg": "degree"}
+# Units by the ends of keys; UDUNITS knows the decibel by this name alone.
+UNITS = {
+    "m_per_s": "m s-1", "m": "m", "s": "s", "hz": "Hz", "db": "0.1 lg(re 1)", "deg": "degree",
+}  # fmt: skip
 
 
 class SweepError(RuntimeError):
@@ -539,7 +542,7 @@ def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Ro
         data[name] = values.astype(int) if name == "residues" else values
     swept = {}
     for key, listed in sweep.over.items():
-        unit = next((unit for end, unit in _UNITS.items() if key.endswith(f"_{end}")), "1")
+        unit = next((unit for end, unit in UNITS.items() if key.endswith(f"_{end}")), "1")
         numeric = all(_is_number(value) for value in listed)
         attrs = {"long_name": key} | ({"units": unit} if numeric else {})
         texts = [value if isinstance(value, str) else _text(value) for value in listed]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -54,8 +54,6 @@ class Variable:
         Sign convention and meaning, where they matter.
     flag_meanings
         For flags: the words for false and true.
-    attributes
-        Other attributes.
     """
 
     dims: tuple[str, ...]
@@ -64,7 +62,6 @@ class Variable:
     long_name: str
     comment: str = ""
     flag_meanings: str = ""
-    attributes: dict[str, str] = field(default_factory=dict)
 
     @property
     def attrs(self) -> dict[str, str]:
@@ -76,7 +73,7 @@ class Variable:
             attrs["comment"] = self.comment
         if self.flag_meanings:
             attrs["flag_meanings"] = self.flag_meanings
-        return attrs | self.attributes
+        return attrs
 
 
 _GRID = ("y", "x")
@@ -92,10 +89,9 @@ COORDINATES: dict[str, Variable] = {
     "slant_range": Variable(
         ("slant_range",), "real", "m", "slant range", "half of the path out and back"
     ),
-    "x": Variable(
-        ("x",), "real", "m", "x (along the rail)", "positive to the right", "", {"axis": "X"}
-    ),
-    "y": Variable(("y",), "real", "m", "y (ahead of the vehicle)", "", "", {"axis": "Y"}),
+    # Without CF's axis attribute: it would ask for the latitude and longitude of a vehicle's frame.
+    "x": Variable(("x",), "real", "m", "x (along the rail)", "positive to the right"),
+    "y": Variable(("y",), "real", "m", "y (ahead of the vehicle)"),
     "facet": Variable(("facet",), "integer", "1", "number of the facet"),
     "target": Variable(("target",), "label", "", "point target"),
     "target_height": Variable(("target_height",), "real", "m", "height of the point target"),

@@ -51,6 +51,8 @@ def test_the_file_holds_what_every_cf_tool_reads(tmp_path):
     with netCDF4.Dataset(tmp_path / "a.nc") as file:
         assert file.Conventions == "CF-1.11"
         assert {"image_real", "image_imag"} < set(file.variables)
+        assert file["channel"].dimensions == ("channel_index",)
+        assert "channel" in file["image_real"].coordinates.split()
         assert "_FillValue" not in file["x"].ncattrs()
     with netCDF4.Dataset(tmp_path / "b.nc") as file:
         assert file["shadow"].dtype == np.int8
