@@ -1,4 +1,4 @@
-"""The commands that ask results: ``trace``, ``verify``, ``diff``."""
+"""The commands on results: ``trace``, ``verify``, ``diff``, ``reproduce``, ``crate``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from vinsar import config, lineage, validation
+from vinsar import config, lineage, reproduction, validation
 
 
 def _study(name: str, files: list[str]) -> config.Study | None:
@@ -53,6 +53,43 @@ def _diff(arguments: argparse.Namespace) -> int:
     return int(bool(lines))
 
 
+def _reproduce(arguments: argparse.Namespace) -> int:
+    name = Path(arguments.folder).name
+    _known_study(name, arguments.configfile)
+    own = [f"config/{name}.yaml"] if name != "paper" else []
+    verdict = reproduction.reproduce(
+        arguments.folder, configuration=arguments.configfile or own, cores=arguments.cores
+    )
+    for different in verdict.differing:
+        sys.stdout.write(f"{different}: not the same bytes\n")
+    sys.stdout.write("".join(f"{reason}\n" for reason in verdict.reasons))
+    total, same = len(verdict.compared), len(verdict.compared) - len(verdict.differing)
+    before, now = verdict.cores
+    sys.stdout.write(
+        f"{same} of {total} results are the same bytes (cores: {before}, then {now}): "
+        f"{'reproduced' if same == total else 'NOT reproduced'}\n"
+    )
+    if verdict.kept is not None:
+        sys.stdout.write(f"The fresh run is in {verdict.kept}\n")
+    return int(same != total)
+
+
+def _crate(arguments: argparse.Namespace) -> int:
+    from vinsar import crate
+
+    study = _known_study(Path(arguments.folder).name, arguments.configfile)
+    archive = crate.write(arguments.folder, study, agent=arguments.agent)
+    sys.stdout.write(f"{arguments.folder} is an RO-Crate now; packed: {archive}\n")
+    return 0
+
+
+def _known_study(name: str, files: list[str]) -> config.Study:
+    study = _study(name, files)
+    if study is None:
+        raise ValueError(f"config/{name}.yaml is not there; name the study's with --configfile")
+    return study
+
+
 def main() -> int:
     """Answer a command; return the exit code."""
     parser = argparse.ArgumentParser(prog="./run", description=__doc__)
@@ -63,7 +100,15 @@ def main() -> int:
     verify = commands.add_parser("verify", help="check all results of a study")
     verify.add_argument("folder")
     verify.set_defaults(answer=_verify)
-    for parser_ in (trace, verify):
+    again = commands.add_parser("reproduce", help="run a study afresh and compare every byte")
+    again.add_argument("folder")
+    again.add_argument("--cores", type=int, help="cores of the fresh run, if not one less")
+    again.set_defaults(answer=_reproduce)
+    packed = commands.add_parser("crate", help="make an RO-Crate of a finished study")
+    packed.add_argument("folder")
+    packed.add_argument("--agent", default="", help="name of the person who ran the study")
+    packed.set_defaults(answer=_crate)
+    for parser_ in (trace, verify, again, packed):
         parser_.add_argument(
             "--configfile",
             nargs="+",

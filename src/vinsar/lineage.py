@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 RECORDS = "records"
 
+Records = dict[str, dict[str, Any]]
+
 
 def write_record(
     path: str | Path,
@@ -86,7 +88,7 @@ def _instant(seconds: float) -> str:
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")
 
 
-def read_records(folder: str | Path) -> dict[str, dict[str, Any]]:
+def read_records(folder: str | Path) -> Records:
     """Return a study's records by the results' paths within its folder.
 
     Raises
@@ -274,16 +276,17 @@ def _differences(attributes: Mapping[str, str], study: config.Study | None) -> I
             yield f"library {name} was {version}, is {now.get(name, 'not installed')}"
     if study is None:
         return
-    for key, value in _leaves(json.loads(attributes["vinsar_configuration"])):
+    for key, value in leaves(json.loads(attributes["vinsar_configuration"])):
         current = _current(study, attributes["vinsar_stage"], key)
         if current != value:
             yield f"configuration {key} was {value}, is {current}"
 
 
-def _leaves(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of a nested configuration, joined by dots, with their values."""
     if isinstance(value, dict) and value:
         for key, inner in value.items():
-            yield from _leaves(inner, f"{prefix}.{key}" if prefix else key)
+            yield from leaves(inner, f"{prefix}.{key}" if prefix else key)
     elif prefix:
         yield prefix, value
 
@@ -292,8 +295,7 @@ def _current(study: config.Study, stage: str, key: str) -> Any:
     whole = study.model_dump(mode="json")
     # A sweep's own definition stands under its name.
     whole["sweep"] = whole["sweeps"].get(stage.removeprefix("sweep "), {})
-    leaves = dict(_leaves(whole))
-    return leaves.get(key)
+    return dict(leaves(whole)).get(key)
 
 
 def as_text(origin: Origin) -> str:
@@ -310,8 +312,8 @@ def _lines(origin: Origin, first: str, rest: str, seen: set[Path]) -> Iterator[s
     yield f"{first}{shown} ({stage}){mark}" + (" (as above)" if again else "")
     details = [f"! {change}" for change in origin.changes]
     if not again:
-        leaves = _leaves(json.loads(origin.attributes.get("vinsar_configuration", "{}")))
-        details += [f"{key} = {json.dumps(value)}" for key, value in leaves]
+        values = leaves(json.loads(origin.attributes.get("vinsar_configuration", "{}")))
+        details += [f"{key} = {json.dumps(value)}" for key, value in values]
         code = json.loads(origin.attributes.get("vinsar_code", "{}"))
         details += [
             f"code: {len(code)} files, {origin.attributes.get('vinsar_commit', '')}".rstrip(", ")
@@ -458,7 +460,7 @@ def _summary(folder: str | Path) -> dict[str, dict[str, dict[str, Any]]]:
     for record in read_records(folder).values():
         attributes = record["provenance"]
         for title, values in (
-            ("configuration", dict(_leaves(json.loads(attributes["vinsar_configuration"])))),
+            ("configuration", dict(leaves(json.loads(attributes["vinsar_configuration"])))),
             ("code", json.loads(attributes["vinsar_code"])),
             ("library", json.loads(attributes["vinsar_libraries"])),
         ):
@@ -466,7 +468,7 @@ def _summary(folder: str | Path) -> dict[str, dict[str, dict[str, Any]]]:
                 result[title].setdefault(key, {})[attributes["vinsar_stage"]] = value
     summary = folder / "accuracy.json"
     if summary.is_file():
-        for key, value in _leaves(json.loads(summary.read_text(encoding="utf-8"))):
+        for key, value in leaves(json.loads(summary.read_text(encoding="utf-8"))):
             result["accuracy"][key] = {"accuracy_summary": value}
     return result
 

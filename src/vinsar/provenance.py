@@ -22,6 +22,11 @@ _LIBRARIES = (
     "scikit-image", "scipy", "whirlwind-insar", "xarray",
 )  # fmt: skip
 
+# What a study is run by and from, in the repository.
+_RUN_BY = ("CITATION.cff", "LICENSE", "README.md", "Snakefile", "pyproject.toml", "requirements.in",
+           "requirements.lock", "run")  # fmt: skip
+_RUN_FROM = ("config", "profiles", "src", "workflow")
+
 
 def sources_of(*modules: str) -> list[Path]:
     """Return the files of modules and of all they import within the package.
@@ -92,6 +97,31 @@ def _run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
         if not typing_only:
             yield node
             yield from _run_nodes(node)
+
+
+def workflow_files() -> list[Path]:
+    """Return the files of the repository that running a study needs, from the working folder.
+
+    Returns
+    -------
+    list of Path
+        Relative and sorted; what is made on the way, such as compiled code, is left out.
+
+    Raises
+    ------
+    ValueError
+        If the working folder is not the repository.
+    """
+    found = [Path(name) for name in _RUN_BY if Path(name).is_file()]
+    for name in _RUN_FROM:
+        if not Path(name).is_dir():
+            raise ValueError(f"{Path.cwd()} has no folder {name}; start in the repository")
+        found += [
+            path
+            for path in Path(name).rglob("*")
+            if path.is_file() and "__pycache__" not in path.parts and path.name[0] != "."
+        ]
+    return sorted(found)
 
 
 def sha256(path: str | Path) -> str:

@@ -10,19 +10,30 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+FILES = ("Snakefile", "run", "requirements.lock", "CITATION.cff", "LICENSE")
 
 
 class Checkout:
     """A copy of the repository in which Snakemake runs."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.folder, self.results = folder, folder / "results/tiny"
+
+    @classmethod
+    def new(cls, folder: Path) -> "Checkout":
+        """Return one in which nothing has run."""
         for name in ("src", "workflow", "config", "profiles"):
             ignore = shutil.ignore_patterns("__pycache__")
             shutil.copytree(ROOT / name, folder / name, ignore=ignore)
-        for path in (ROOT / "Snakefile", ROOT / "tests/workflow/tiny.yaml"):
-            shutil.copy(path, folder)
-        self.results = folder / "results/tiny"
+        for name in (*FILES, "tests/workflow/tiny.yaml"):
+            shutil.copy(ROOT / name, folder)
+        return cls(folder)
+
+    def copy(self, folder: Path) -> "Checkout":
+        """Return a copy with its results, to be asked and to be spoilt."""
+        ignore = shutil.ignore_patterns("__pycache__", ".snakemake")
+        shutil.copytree(self.folder, folder, ignore=ignore)
+        return Checkout(folder)
 
     def snakemake(self, *arguments: str, extra: str = "") -> subprocess.CompletedProcess[str]:
         files = ["tiny.yaml"]
@@ -31,6 +42,17 @@ class Checkout:
             files.append("extra.yaml")
         return subprocess.run(
             [sys.executable, "-m", "snakemake", "--configfile", *files, "--nocolor", *arguments],
+            cwd=self.folder,
+            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    def ask(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run a command of ours on results, such as ``verify``."""
+        return subprocess.run(
+            [sys.executable, "-m", "vinsar", *arguments],
             cwd=self.folder,
             env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
             capture_output=True,
@@ -52,7 +74,7 @@ class Checkout:
 @pytest.fixture(scope="session")
 def checkout(tmp_path_factory):
     """A checkout whose study has been run once; tests leave it as they found it."""
-    made = Checkout(tmp_path_factory.mktemp("checkout"))
+    made = Checkout.new(tmp_path_factory.mktemp("checkout"))
     done = made.snakemake()
     assert done.returncode == 0, done.stdout + done.stderr
     return made
@@ -61,4 +83,16 @@ def checkout(tmp_path_factory):
 @pytest.fixture(scope="session")
 def new_checkout(tmp_path_factory):
     """Make a checkout in which nothing has run."""
-    return lambda: Checkout(tmp_path_factory.mktemp("checkout"))
+    return lambda: Checkout.new(tmp_path_factory.mktemp("checkout"))
+
+
+@pytest.fixture
+def copy(checkout, tmp_path):
+    """A copy of the finished study for one test."""
+    return checkout.copy(tmp_path / "copy")
+
+
+@pytest.fixture(scope="module")
+def lasting_copy(checkout, tmp_path_factory):
+    """A copy of the finished study for a module's tests, which leave it as they found it."""
+    return checkout.copy(tmp_path_factory.mktemp("copies") / "copy")

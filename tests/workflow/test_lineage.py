@@ -1,40 +1,13 @@
 """Asking results where they come from, on the finished tiny study."""
 
 import json
-import os
 import shutil
-import subprocess
-import sys
 
 import netCDF4
 import pytest
 
 CONFIG = ("--configfile", "tiny.yaml")
 SPOILT = ("fig1.pdf", "fig2.png", "fig4.pdf")
-
-
-class Copy:
-    """A copy of the finished study, to be spoilt."""
-
-    def __init__(self, checkout, folder):
-        self.folder = folder
-        shutil.copytree(checkout.folder, folder, dirs_exist_ok=True)
-        self.results = folder / "results/tiny"
-
-    def ask(self, *arguments):
-        return subprocess.run(
-            [sys.executable, "-m", "vinsar", *arguments],
-            cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-
-@pytest.fixture
-def copy(checkout, tmp_path):
-    return Copy(checkout, tmp_path / "copy")
 
 
 def test_an_unchanged_study_is_verified(copy):
@@ -134,15 +107,3 @@ def test_a_folder_without_a_study_is_named(copy):
     assert done.returncode == 2
     assert "empty holds no records of a study" in done.stderr
     assert "Traceback" not in done.stderr
-
-
-def test_the_same_study_elsewhere_and_on_another_number_of_cores_is_the_same_bytes(
-    checkout, new_checkout
-):
-    other = new_checkout()
-    done = other.snakemake("--cores", "1")
-    assert done.returncode == 0, done.stdout + done.stderr
-    for path in sorted(checkout.results.rglob("*")):
-        name = path.relative_to(checkout.results)
-        if path.is_file() and name.parts[0] not in {"logs", "benchmarks", "records"}:
-            assert (other.results / name).read_bytes() == path.read_bytes(), name
