@@ -831,18 +831,20 @@ def _elements_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault]
 
 
 def _sides_apart(
-    radar: config.Radar, imaging: config.Imaging, vehicle: config.Vehicle
+    radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
 ) -> Iterator[Fault]:
-    # Corner of the image that the turning axis meets first.
-    most = imaging.y_min_m / imaging.x_max_m if imaging.x_max_m > 0 else np.inf
+    # The corner that the axis meets first as it turns.
+    most = min(
+        part.y_min_m / part.x_max_m if part.x_max_m > 0 else np.inf for part in (scene, imaging)
+    )
     speed = vehicle.forward_speed_m_per_s
     if speed * vehicle.scan_duration_s / radar.aperture_length_m > most:
         limit = most * radar.aperture_length_m / vehicle.scan_duration_s
         yield Fault(
             "vehicle.forward_speed_m_per_s",
             speed,
-            f"turns the aperture until its axis points into the image, and ground on both sides of "
-            f"the axis is imaged upon each other: this scan is unambiguous up to {limit:.3g} m/s",
+            "turns the aperture until its axis meets the scene, and ground on one side of the axis "
+            f"is imaged upon that on the other; this scan keeps them apart up to {limit:.3g} m/s",
         )
 
 

@@ -230,7 +230,7 @@ def test_an_aperture_that_points_into_the_image_is_advised_against():
     vehicle = MOVING | {"scan_duration_s": 0.5}
     (sentence,) = validation.advice(validation.check(changed(vehicle=vehicle)))
     # y / x = 10 / 2.5 in the near right corner, at a cart speed of 1.6 m/s.
-    assert "unambiguous up to 6.4 m/s" in sentence
+    assert "apart up to 6.4 m/s" in sentence
     vehicle |= {"forward_speed_m_per_s": 6.3}
     assert validation.advice(validation.check(changed(vehicle=vehicle))) == []
 
