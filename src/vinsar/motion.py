@@ -271,3 +271,28 @@ def point_gain(
     step = np.exp(2j * np.pi * delay * (frequency[1] - frequency[0]))
     profile = polynomial.polyval(step, range_weights) * np.exp(2j * np.pi * delay * frequency[0])
     return np.asarray(np.abs(profile @ aperture_weights))
+
+
+def sufficient_error(errors: Floats, spread: Floats, *, factor: float) -> float:
+    """Return the largest error that lets the heights' spread exceed the error-free one's so far.
+
+    Parameters
+    ----------
+    errors
+        Errors (level,), rising from 0.
+    spread
+        Spread of the heights at each.
+    factor
+        How far the spread may go, in units of that without error.
+
+    Returns
+    -------
+    float
+        Linear between the levels; infinite if the spread stays below at all of them.
+    """
+    limit = factor * spread[0]
+    beyond = np.flatnonzero(spread > limit)
+    if beyond.size == 0:
+        return float("inf")
+    last = int(beyond[0])
+    return float(np.interp(limit, spread[last - 1 : last + 1], errors[last - 1 : last + 1]))

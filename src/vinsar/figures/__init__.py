@@ -16,6 +16,7 @@ from vinsar.figures import (
     baselines,
     chain,
     height_error,
+    moving,
     noise,
     registration_error,
     summary,
@@ -89,6 +90,12 @@ FIGURES: dict[str, Figure] = {
         (),
         ("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
         ("snr",),
+    ),
+    "moving": Figure(
+        moving.draw,
+        ("terrain", "truth"),
+        ("figures", "radar", "imaging", "vehicle"),
+        ("speed", "speed_error"),
     ),
 }
 """The figures by name: the paper's in its order, then those of its section 1.2 and of noise."""

@@ -1,0 +1,286 @@
+"""The vehicle moves during the scan: turned apertures, focus and height, and the speed sensor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar import motion, scene, variables
+from vinsar.figures import style, sweeps
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from vinsar import config
+    from vinsar.pipeline import Products
+
+    Floats = NDArray[np.floating]
+
+_SPEED, _DURATION = "vehicle_forward_speed_m_per_s", "vehicle_scan_duration_s"
+_CORRECTION, _ERROR = "vehicle_speed_correction", "vehicle_speed_error_m_per_s"
+_REGION = "visible_ground"
+_TOLERATED = 1.1
+_DRAWS, _LEVELS = 11, 15
+
+_LOOKS = {
+    "none": sweeps.Look("not corrected", style.ORANGE, (0, (4, 1.5)), "s"),
+    "exact": sweeps.Look("true speed", style.BLUE, "-", "o"),
+    "sensor": sweeps.Look("speed sensor", style.INK, (0, (4, 1.2, 1, 1.2)), "^"),
+}
+_HEIGHT_MM = 104.0
+_BOTTOM, _TALL, _LOW, _HIGH = 25.0, 72.0, 32.0, 65.0
+_LEFTS = (10.0, 50.0, 94.0, 141.0)
+_WIDTHS = (27.0, 32.0, 32.0, 36.0)
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw the turned aperture, and focus and height against speed and against its error.
+
+    Parameters
+    ----------
+    products
+        ``sweeps/speed``, ``sweeps/speed_error``, ``terrain`` and ``truth``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    speed = variables.swept(products["sweeps/speed"], _DURATION, _CORRECTION, _SPEED)
+    error = variables.swept(products["sweeps/speed_error"], _DURATION, _ERROR)
+    speed, error = speed.sortby(_SPEED), error.sortby([_DURATION, _ERROR])
+    durations = sorted((float(value) for value in speed[_DURATION].values), reverse=True)
+    seen = ~products["truth"]["shadow"].values
+    relief = float(products["truth"]["height"].values[seen].std())
+    figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
+    _plan(
+        style.place(figure, _LEFTS[0], _BOTTOM, _WIDTHS[0], _TALL), study, speed[_SPEED].values,
+        durations,
+    )  # fmt: skip
+    std = speed["std"].sel(region=_REGION)
+    limits = sweeps.around(100 * std.values, 100 * error["std"].sel(region=_REGION).values)
+    limits = limits[0], max(limits[1], 130 * relief)
+    handles: list[Any] = []
+    for number, (duration, left, width) in enumerate(
+        zip(durations[:2], _LEFTS[1:3], _WIDTHS[1:3], strict=False)
+    ):
+        upper = style.place(figure, left, _HIGH, width, _LOW)
+        _focus(upper, speed.sel({_DURATION: duration}))
+        upper.set_title(f"({'bc'[number]}) scan of {_time(duration)}")
+        lower = style.place(figure, left, _BOTTOM, width, _LOW)
+        for name, look in _corrections(speed):
+            at = std.sel({_DURATION: duration, _CORRECTION: name})
+            sweeps.curve(lower, speed[_SPEED].values, at, look, scale=100)
+        handles, _ = lower.get_legend_handles_labels()
+        handles.append(_level(lower, relief))
+        _log_y(lower, limits)
+        lower.set_xlabel("forward speed (m/s)")
+        if number == 0:
+            upper.set_ylabel("amplitude (1)")
+            lower.set_ylabel("height error, std (cm)")
+    axes = style.place(figure, _LEFTS[3], _BOTTOM, _WIDTHS[3], _TALL)
+    keys = _sensor(axes, error, products, study)
+    _level(axes, relief)
+    _log_y(axes, limits)
+    sweeps.legend(figure, [*handles, *_keys()], _LEFTS[0], 2.0, 3)
+    sweeps.legend(figure, keys, _LEFTS[3] - 13.0, 2.0, 1)
+    return figure
+
+
+def _time(duration: float) -> str:
+    return f"{duration:g} s" if duration >= 0.1 else f"{1000 * duration:g} ms"
+
+
+def _corrections(speed: xr.Dataset) -> list[tuple[str, sweeps.Look]]:
+    return [(name, look) for name, look in _LOOKS.items() if name in speed[_CORRECTION].values]
+
+
+def _keys() -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    return [
+        sweeps.band_patch(),
+        Line2D([], [], color=style.INK, linewidth=0.7, linestyle=":",
+               label="(b, c) where its image lies"),
+        Line2D([], [], color=style.GREY, linewidth=2.2, label="(d) predicted (in brackets)"),
+    ]  # fmt: skip
+
+
+def _log_y(axes: Axes, limits: tuple[float, float]) -> None:
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    sweeps.log_axis(axes.yaxis, limits)
+
+
+def _level(axes: Axes, relief: float) -> Any:
+    return axes.axhline(
+        100 * relief,
+        label=f"level DEM: {100 * relief:.1f} cm",
+        color=style.GREY,
+        linestyle="--",
+        linewidth=0.9,
+        zorder=0.5,
+    )
+
+
+def _plan(axes: Axes, study: config.Study, speeds: Floats, durations: list[float]) -> None:
+    """Draw apertures, image, and where the image lies uncorrected, seen from above."""
+    from matplotlib.patches import Polygon, Rectangle
+
+    part, length = study.imaging, study.radar.aperture_length_m
+    low, high = np.array([part.x_min_m, part.y_min_m]), np.array([part.x_max_m, part.y_max_m])
+    axes.add_patch(Rectangle((low[0], low[1]), *(high - low), facecolor="#e3e6e8", linewidth=0))
+    middle = (low + high) / 2
+    axes.text(middle[0], middle[1], "image", ha="center", va="center", color="#55595d")
+    top = float(speeds.max())
+    shown = [float(speeds[np.abs(speeds - share * top).argmin()]) for share in (0.0, 0.5, 1.0)]
+    for speed in shown:
+        slope = float(motion.slope(speed, aperture_length_m=length, duration_s=durations[0]))
+        x = np.array([-0.5, 0.5]) * length
+        axes.plot(x, slope * x, color=style.BLUE, linewidth=1.4)
+        axes.annotate(
+            f"{speed:g} m/s", (x[1], slope * x[1]), (2, 0), textcoords="offset points",
+            va="center", color=style.BLUE, fontsize=style.points(6.5),
+        )  # fmt: skip
+    slope = float(motion.slope(shown[1], aperture_length_m=length, duration_s=durations[-1]))
+    edge, zero = np.linspace(0, 1, 21)[:-1], np.zeros(20)
+    sides = (edge, zero), (1 + zero, edge), (1 - edge, 1 + zero), (zero, 1 - edge)
+    outline = low + np.concatenate([np.stack(side, -1) for side in sides]) * (high - low)
+    moved = np.stack(motion.imaged_place(*outline.T, true_slope=slope, told_slope=0.0), -1)
+    axes.add_patch(
+        Polygon(moved, fill=False, edgecolor=style.ORANGE, linewidth=0.9, linestyle=(0, (4, 1.5)))
+    )
+    # Metres are as long along y as along x.
+    x_limits = low[0] - 0.6, max(high[0], float(moved[:, 0].max())) + 0.6
+    tall = (x_limits[1] - x_limits[0]) * _TALL / _WIDTHS[0]
+    axes.set_xlim(*x_limits)
+    axes.set_ylim(high[1] + 1.0 - tall, high[1] + 1.0)
+    axes.text(
+        sum(x_limits) / 2, low[1] - 1.0,
+        f"not corrected:\n{shown[1]:g} m/s, {_time(durations[-1])}", ha="center", va="top", color=style.ORANGE, fontsize=style.points(6.5),
+    )  # fmt: skip
+    axes.xaxis.set_major_locator(style.round_ticks(3))
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y, ahead (m)")
+    axes.set_title(f"(a) apertures, {_time(durations[0])}")
+
+
+def _focus(axes: Axes, speed: xr.Dataset) -> None:
+    # Both antennas stand on one cart and lose focus alike.
+    at = speed[_SPEED].values
+    for name, look in _corrections(speed):
+        part = speed.sel({_CORRECTION: name}).mean("channel")
+        sweeps.curve(axes, at, part["point_gain"], look)
+        peak, _, _ = sweeps.spread(part["peak_gain"])
+        axes.plot(at, peak, color=look.colour, linestyle=":", linewidth=0.9)
+    axes.set_ylim(0, 1.08)
+    axes.yaxis.set_major_locator(style.round_ticks(5))
+    axes.tick_params(labelbottom=False)
+
+
+def predicted_std(
+    terrain: xr.Dataset, truth: xr.Dataset, *, true_slope: float, told_slope: float, floor_m: float
+) -> float:
+    """Return the spread of the height error that a wrong speed makes on visible ground, m.
+
+    The image shows at each place the height of another (`motion.imaged_place`): to the error-free
+    variance comes that of the difference.
+
+    Parameters
+    ----------
+    terrain, truth
+        Products of these names.
+    true_slope, told_slope
+        Of the true speed and of the one that imaging is told (`motion.slope`).
+    floor_m
+        Error-free standard deviation, m.
+
+    Returns
+    -------
+    float
+        Standard deviation, m; NaN where the image shows none of the ground.
+    """
+    x, y = np.meshgrid(truth["x"].values, truth["y"].values)
+    # Swapped: the ground that is imaged at a place of the grid.
+    ground = motion.imaged_place(x, y, true_slope=told_slope, told_slope=true_slope)
+    error = scene.sample(terrain["height"], *ground) - truth["height"].values
+    inside = np.isfinite(ground[0]) & ~truth["shadow"].values
+    return float(np.hypot(floor_m, error[inside].std())) if inside.any() else float("nan")
+
+
+def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: config.Study) -> list[Any]:
+    """Draw the spread of the height against the sensor's error; return what errors suffice."""
+    from matplotlib.ticker import FixedLocator
+    from scipy.stats import norm
+
+    keys: list[Any] = axes.plot([], [], linestyle="", label="(d) a tenth more at an error of")
+    levels = error[_ERROR].values
+    positive = levels[levels > 0]
+    draws = norm.ppf((np.arange(_DRAWS) + 0.5) / _DRAWS)
+    fine = np.concatenate([[0.0], np.geomspace(positive.min(), positive.max(), _LEVELS)])
+    speed = study.vehicle.forward_speed_m_per_s
+    looks = (
+        sweeps.Look("", style.INK, "-", "^"),
+        sweeps.Look("", style.BLUE, (0, (4, 1.5)), "o"),
+    )
+    durations = sorted((float(value) for value in error[_DURATION].values), reverse=True)
+    for duration, look in zip(durations, looks, strict=False):
+        part = error["std"].sel({_DURATION: duration, "region": _REGION})
+        mean, _, _ = sweeps.spread(part)
+        slopes = {
+            told: float(
+                motion.slope(told, aperture_length_m=study.radar.aperture_length_m,
+                             duration_s=duration)
+            )
+            for told in [speed, *(speed + np.outer(fine, draws).ravel())]
+        }  # fmt: skip
+        predicted = np.array(
+            [
+                np.mean(
+                    [
+                        predicted_std(
+                            products["terrain"], products["truth"], true_slope=slopes[speed],
+                            told_slope=slopes[speed + one * draw_], floor_m=mean[0],
+                        )
+                        for draw_ in draws
+                    ]
+                )
+                for one in fine
+            ]
+        )  # fmt: skip
+        axes.plot(fine[1:], 100 * predicted[1:], color=style.GREY, linewidth=2.2, zorder=0.8)
+        sweeps.curve(axes, positive, part.sel({_ERROR: positive}), look, scale=100)
+        measured = motion.sufficient_error(levels, mean, factor=_TOLERATED)
+        theory = motion.sufficient_error(fine, predicted, factor=_TOLERATED)
+        if np.isfinite(measured):
+            axes.axvline(measured, color=look.colour, linewidth=0.7, linestyle=":")
+        keys += axes.plot(
+            [], [], color=look.colour, linestyle=look.line, marker=look.marker, markersize=3,
+            markerfacecolor="white", markeredgewidth=0.8,
+            label=f"{_time(duration)}: {_speed(measured)} ({_speed(theory)})",
+        )  # fmt: skip
+    axes.set_xscale("log")
+    limits = positive.min() * 0.8, positive.max() * 1.25
+    axes.set_xlim(*limits)
+    sweeps.log_axis(axes.xaxis, limits)
+    decades = 10.0 ** np.arange(-6, 3)
+    axes.xaxis.set_major_locator(
+        FixedLocator([value for value in decades if limits[0] <= value <= limits[1]])
+    )
+    axes.set_xlabel("sensor error, std (m/s)")
+    axes.set_ylabel("height error, std (cm)")
+    axes.set_title(f"(d) speed sensor, {speed:g} m/s")
+    return keys
+
+
+def _speed(value: float) -> str:
+    if not np.isfinite(value):
+        return "none seen"
+    return f"{1000 * value:.2g} mm/s" if value < 0.1 else f"{value:.2g} m/s"
