@@ -15,11 +15,21 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pytest
+import xarray as xr
 import yaml
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from vinsar import baseline, config, figures, geometry, pipeline, validation, variables
+from vinsar import (
+    baseline,
+    config,
+    figures,
+    geometry,
+    motion,
+    pipeline,
+    validation,
+    variables,
+)
 from vinsar.figures import (
     acquisition,
     baselines,
@@ -27,17 +37,18 @@ from vinsar.figures import (
     files,
     height_error,
     maps,
+    moving,
     style,
     summary,
     sweeps,
 )
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
-OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr"]
+OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr", "moving"]
 NAMES = [
     "summary",
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
-    *("baseline_length", "baseline_angle", "baseline_vibration", "snr"),
+    *("baseline_length", "baseline_angle", "baseline_vibration", "snr", "moving"),
 ]
 NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr"}
 # The front sheet is a slide, whatever the journal's columns and text are.
@@ -71,6 +82,8 @@ SMALL: dict[str, dict[str, Any]] = {
 
 def make_study(**sections: dict[str, Any]) -> config.Study:
     values = yaml.safe_load(PAPER.read_text(encoding="utf-8"))
+    moving = yaml.safe_load(PAPER.with_name("moving.yaml").read_text(encoding="utf-8"))
+    values["sweeps"] |= moving["sweeps"]
     for name, section in sections.items():
         values[name] |= section
     return config.Study.model_validate(values)
@@ -762,6 +775,48 @@ def test_snr_shows_the_sweep_and_the_bound(
     np.testing.assert_allclose(
         lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), expected
     )
+
+
+def test_moving_shows_the_sweeps_and_the_sensor_that_suffices(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    figure = draw("moving", products, study)
+    _, slow_focus, slow, _, fast, sensor = figure.axes
+    speed = products["sweeps/speed"]
+    std = 100 * speed["std"].sel(region="visible_ground").mean("realization")
+    for axes, duration in ((slow, 0.5), (fast, 0.03)):
+        for label, correction in (("not corrected", "none"), ("true speed", "exact")):
+            line = lines_of(axes)[label]
+            at = {"vehicle_scan_duration_s": duration, "vehicle_speed_correction": correction}
+            np.testing.assert_allclose(line.get_ydata(), std.sel(at))
+    gain = speed["point_gain"].sel(vehicle_scan_duration_s=0.5, vehicle_speed_correction="sensor")
+    np.testing.assert_allclose(
+        lines_of(slow_focus)["speed sensor"].get_ydata(), gain.mean(("realization", "channel"))
+    )
+    error = products["sweeps/speed_error"]
+    spread = error["std"].sel(region="visible_ground").mean("realization")
+    levels = error["vehicle_speed_error_m_per_s"].values
+    marks = [line.get_xdata()[0] for line in sensor.lines if line.get_linestyle() == ":"]
+    for duration, mark in zip((0.5, 0.03), marks, strict=True):
+        means = spread.sel(vehicle_scan_duration_s=duration).values
+        assert mark == motion.sufficient_error(levels, means, factor=1.1)
+        shown = f"{1000 * mark:.2g} mm/s" if mark < 0.1 else f"{mark:.2g} m/s"
+        assert any(shown in text.get_text() for text in figure.legends[1].get_texts())
+
+
+def test_a_wrong_speed_shows_the_heights_of_other_places(products: pipeline.Products) -> None:
+    # On a slope across the way the turned image errs by slope x angle x distance ahead.
+    terrain, truth = products["terrain"].copy(deep=True), products["truth"].copy(deep=True)
+    for part in (terrain, truth):
+        part["height"] = 0.1 * part["x"] + 0 * part["y"]
+        part["height"] = part["height"].transpose("y", "x")
+    truth["shadow"] = xr.zeros_like(truth["shadow"])
+    inner = truth.isel(x=slice(3, -3))
+    found = moving.predicted_std(terrain, inner, true_slope=0.2, told_slope=0.201, floor_m=0.0)
+    # 0.1 x 1 mrad x std of y; the place along x adds k x to y, 1 % in the square root.
+    assert found == pytest.approx(1e-4 * float(inner["y"].std()), rel=0.03)
+    both = moving.predicted_std(terrain, inner, true_slope=0.2, told_slope=0.201, floor_m=1e-4)
+    assert both == pytest.approx(np.hypot(found, 1e-4))
 
 
 @pytest.mark.parametrize("name", [*OF_SWEEPS, "baseline_angle"])

@@ -377,6 +377,13 @@ def test_a_wrong_speed_defocuses_by_the_quadratic_rest(rail, true, told):
     assert gain(truth, recorded, narrow).max() < 0.3 < found.min()
 
 
+def test_the_error_that_suffices_is_where_the_spread_passes_the_limit():
+    levels, spread = np.array([0.0, 1.0, 2.0, 4.0]), np.array([1.0, 1.02, 1.18, 1.5])
+    assert motion.sufficient_error(levels, spread, factor=1.1) == pytest.approx(1.5)
+    assert motion.sufficient_error(levels, spread, factor=1.01) == pytest.approx(0.5)
+    assert motion.sufficient_error(levels, spread, factor=2.0) == np.inf
+
+
 def test_the_margin_of_the_profiles_covers_the_errors_or_says_so(rail):
     profiles = variables.dataset(
         "profiles",

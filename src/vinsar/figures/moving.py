@@ -163,9 +163,14 @@ def _plan(axes: Axes, study: config.Study, speeds: Floats, durations: list[float
     axes.set_xlim(*x_limits)
     axes.set_ylim(high[1] + 1.0 - tall, high[1] + 1.0)
     axes.text(
-        sum(x_limits) / 2, low[1] - 1.0,
-        f"not corrected:\n{shown[1]:g} m/s, {_time(durations[-1])}", ha="center", va="top", color=style.ORANGE, fontsize=style.points(6.5),
-    )  # fmt: skip
+        sum(x_limits) / 2,
+        low[1] - 1.0,
+        f"not corrected:\n{shown[1]:g} m/s, {_time(durations[-1])}",
+        ha="center",
+        va="top",
+        color=style.ORANGE,
+        fontsize=style.points(6.5),
+    )
     axes.xaxis.set_major_locator(style.round_ticks(3))
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y, ahead (m)")
