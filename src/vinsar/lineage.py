@@ -128,7 +128,13 @@ def read_provenance(path: str | Path) -> dict[str, str]:
         If the file carries none.
     """
     path = Path(path)
-    readers = {".nc": _from_netcdf, ".png": _from_png, ".pdf": _from_pdf, ".svg": _from_svg}
+    readers = {
+        ".nc": _from_netcdf,
+        ".png": _from_png,
+        ".pdf": _from_pdf,
+        ".svg": _from_svg,
+        ".html": _from_html,
+    }
     try:
         attributes = readers[path.suffix](path)
     except KeyError:
@@ -157,13 +163,19 @@ def _from_png(path: Path) -> dict[str, str]:
 
 
 def _from_pdf(path: Path) -> dict[str, str]:
-    # Matplotlib writes the information dictionary plainly, with the brackets escaped.
-    found = re.search(rb"/Keywords \((.*?)(?<!\\)\)\s", path.read_bytes(), re.DOTALL)
+    # Matplotlib and Typst write the information dictionary plainly, with the brackets escaped.
+    found = re.search(rb"/Keywords ?\((.*?)(?<!\\)\)[\s/>]", path.read_bytes(), re.DOTALL)
     if found is None:
         return {}
     text = re.sub(rb"\\(.)", rb"\1", found[1], flags=re.DOTALL)
     encoding = "utf-16" if text.startswith(b"\xfe\xff") else "latin-1"
     return dict(json.loads(text.decode(encoding)))
+
+
+def _from_html(path: Path) -> dict[str, str]:
+    text = path.read_text(encoding="utf-8")
+    found = re.search(r'<script[^>]* id="vinsar-provenance">(.*?)</script>', text, re.DOTALL)
+    return dict(json.loads(found[1])) if found else {}
 
 
 def _from_svg(path: Path) -> dict[str, str]:
@@ -249,7 +261,8 @@ def _trace(path: Path, folder: Path, study: config.Study | None, expected: str |
     origin.changes += _differences(attributes, study)
     sources = json.loads(attributes.get("vinsar_inputs", "{}"))
     for name, sha in sources.items():
-        origin.inputs.append(_trace(folder / f"{name}.nc", folder, study, sha))
+        source = (record or {}).get("inputs", {}).get(name, f"{name}.nc")
+        origin.inputs.append(_trace(folder / source, folder, study, sha))
     return origin
 
 

@@ -22,7 +22,7 @@ class Checkout:
     @classmethod
     def new(cls, folder: Path) -> "Checkout":
         """Return one in which nothing has run."""
-        for name in ("src", "workflow", "config", "profiles"):
+        for name in ("src", "workflow", "config", "profiles", "docs"):
             ignore = shutil.ignore_patterns("__pycache__")
             shutil.copytree(ROOT / name, folder / name, ignore=ignore)
         for name in (*FILES, "tests/workflow/tiny.yaml"):

@@ -6,6 +6,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 from vinsar import claims, figures, pipeline, provenance, sweep, validation
+from vinsar import report as study_report
 
 try:
     STUDY = validation.check(config)
@@ -111,3 +112,15 @@ def wanted_products():
     if STUDY.outputs.claims:
         read |= {*claims.INPUTS}
     return list(pipeline.needed({*read, "accuracy", "focus"}))
+
+
+def shown_sweeps():
+    """The sweeps that the study's figures show and its claims are decided on."""
+    read = {
+        name
+        for figure in STUDY.outputs.figures
+        for name in figures.FIGURES[figure].sweeps
+    }
+    if STUDY.outputs.claims:
+        read |= {*claims.SWEEPS}
+    return sorted(read)

@@ -1,4 +1,4 @@
-# The paper's claims against this study's figures.
+# The paper's claims against this study's figures, and the study's report.
 
 
 rule claims:
@@ -41,3 +41,39 @@ rule variants:
         configuration=STUDY.model_dump(mode="json"),
     script:
         "../scripts/variants.py"
+
+
+rule report:
+    input:
+        **product_files(*wanted_products()),
+        **sweep_files(*shown_sweeps()),
+        **{
+            f"figures/{name}.{suffix}": f"<results>/figures/{name}.{suffix}"
+            for name in SINGLE
+            for suffix in STUDY.figures.formats
+            if suffix in ("png", "pdf")
+        },
+        **({"claims.json": "<results>/claims.json"} if STUDY.outputs.claims else {}),
+        **(
+            {"accuracy.json": "<results>/accuracy.json"}
+            if "accuracy" in wanted_products()
+            else {}
+        ),
+        code=[
+            *sources_of("report", script="report"),
+            *[os.path.relpath(path) for path in study_report.TEMPLATES],
+            *[f"workflow/report/{name}.rst" for name in SINGLE],
+            "config/paper.yaml",
+            "docs/errata.md",
+        ],
+    output:
+        html="<results>/report.html",
+        pdf="<results>/report.pdf",
+    log:
+        "<logs>/report.log",
+    benchmark:
+        "<benchmarks>/report.tsv"
+    params:
+        configuration=configuration(*study_report.SECTIONS),
+    script:
+        "../scripts/report.py"

@@ -14,6 +14,7 @@ from vinsar import validation
 from vinsar.figures import (
     acquisition,
     baselines,
+    captions,
     chain,
     height_error,
     moving,
@@ -50,46 +51,101 @@ class Figure:
         Parts of the configuration that it reads, and no others.
     sweeps
         Sweeps that it reads; `draw` finds each among the products as ``sweeps/<name>``.
+    title
+        What the report calls it; its name if empty.
+    numbers
+        From the same products and study to a sentence with the figure's own numbers, which the
+        report adds to its caption.
     """
 
     draw: Callable[[Products, config.Study], matplotlib.figure.Figure]
     inputs: tuple[str, ...]
     sections: tuple[str, ...]
     sweeps: tuple[str, ...] = ()
+    title: str = ""
+    numbers: Callable[[Products, config.Study], str] | None = None
 
 
 FIGURES: dict[str, Figure] = {
-    "summary": Figure(summary.draw, summary.INPUTS, ("figures", "radar")),
-    "fig1": Figure(acquisition.draw, (), ("figures", "radar", "scene", "imaging")),
-    "fig2": Figure(registration_error.draw, ("registration",), ("figures",)),
-    "fig3": Figure(chain.draw_sheet, chain.SHEET_INPUTS, ("figures",)),
+    "summary": Figure(
+        summary.draw,
+        summary.INPUTS,
+        ("figures", "radar"),
+        title="Front sheet",
+        numbers=captions.height_error,
+    ),
+    "fig1": Figure(
+        acquisition.draw,
+        (),
+        ("figures", "radar", "scene", "imaging"),
+        title="Geometry",
+        numbers=captions.acquisition_geometry,
+    ),
+    "fig2": Figure(
+        registration_error.draw,
+        ("registration",),
+        ("figures",),
+        title="Registration error",
+        numbers=captions.registration_error,
+    ),
+    "fig3": Figure(
+        chain.draw_sheet,
+        chain.SHEET_INPUTS,
+        ("figures",),
+        title="From terrain to height",
+        numbers=captions.chain,
+    ),
     **{
         f"fig3{letter}": Figure(
             partial(chain.draw_single, letter), chain.panel_inputs(letter), ("figures",)
         )
         for letter in chain.PANELS
     },
-    "fig4": Figure(height_error.draw, ("accuracy",), ("figures",)),
+    "fig4": Figure(
+        height_error.draw,
+        ("accuracy",),
+        ("figures",),
+        title="Height error",
+        numbers=captions.height_error,
+    ),
     "fig5": Figure(
-        vibration.draw, ("truth",), ("figures", "radar", "scene", "sweeps"), ("vibration",)
+        vibration.draw,
+        ("truth",),
+        ("figures", "radar", "scene", "sweeps"),
+        ("vibration",),
+        title="Position errors",
+        numbers=captions.vibration,
     ),
     "baseline_length": Figure(
         baselines.draw_length,
         (),
         ("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
         ("baseline_length",),
+        title="Length of the baseline",
+        numbers=captions.baseline_length,
     ),
     "baseline_angle": Figure(
-        baselines.draw_angle, ("baseline_angle",), ("figures", "radar", "scene")
+        baselines.draw_angle,
+        ("baseline_angle",),
+        ("figures", "radar", "scene"),
+        title="Attitude of the baseline",
+        numbers=captions.baseline_angle,
     ),
     "baseline_vibration": Figure(
-        baselines.draw_vibration, (), ("figures", "motion", "sweeps"), ("baseline_vibration",)
+        baselines.draw_vibration,
+        (),
+        ("figures", "motion", "sweeps"),
+        ("baseline_vibration",),
+        title="Length of the baseline under position errors",
+        numbers=captions.baseline_vibration,
     ),
     "snr": Figure(
         noise.draw,
         (),
         ("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
         ("snr",),
+        title="Thermal noise",
+        numbers=captions.snr,
     ),
     "moving": Figure(
         moving.draw,
