@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from vinsar import aperture, baseline, colormaps, config, geometry, radar, trajectory
+from vinsar import aperture, baseline, colormaps, config, geometry, motion, radar, trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -737,6 +737,34 @@ def _positions_dense(radar: config.Radar, scene: config.Scene) -> Iterator[Fault
         )
 
 
+def _driven_densely(
+    radar: config.Radar, scene: config.Scene, vehicle: config.Vehicle
+) -> Iterator[Fault]:
+    speed = vehicle.forward_speed_m_per_s
+    if speed == 0:
+        return
+    moving = motion.advance(
+        trajectory.planned(radar), speed_m_per_s=speed, duration_s=vehicle.scan_duration_s
+    )
+    edges = (scene.x_min_m, 0.0, scene.x_max_m), (scene.y_min_m, scene.y_max_m)
+    points = np.stack([*np.meshgrid(*edges), np.zeros((2, 3))], axis=-1).reshape(-1, 3)
+    change = np.zeros(len(points))
+    for end in ("transmitter", "receiver"):
+        places = moving[end].values[0]
+        ray = points - places.mean(axis=0)
+        step = (places[-1] - places[0]) / (len(places) - 1)
+        change += ray @ step / np.linalg.norm(ray, axis=-1)
+    # Echoes are told apart while their phases' steps differ by less than a turn.
+    if np.ptp(change) > _Derived.of(radar).shortest_wavelength:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            f"the vehicle drives {step[1]:.3g} m from one antenna position to the next, and the "
+            "scene is imaged ambiguously; take a shorter vehicle.scan_duration_s or "
+            "radar.position_spacing_m",
+        )
+
+
 def _gate_before_image(
     radar: config.Radar, suppression: config.Suppression, imaging: config.Imaging
 ) -> Iterator[Fault]:
@@ -908,6 +936,7 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _facets_fine,
     _grid_fine,
     _positions_dense,
+    _driven_densely,
     _gate_before_image,
     _targets_imaged,
     _claims_of_a_rail,

@@ -210,13 +210,23 @@ MOVING = {
 
 
 def test_a_vehicle_that_reaches_the_scene_before_the_scan_ends_is_refused():
-    raw = changed(vehicle=MOVING | {"scan_duration_s": 2.5})
+    raw = changed(vehicle=MOVING | {"scan_duration_s": 2.5}, radar__position_spacing_m=0.005)
     says = faults(raw)["vehicle.forward_speed_m_per_s"]
     # 10 m to the scene less a facet, in half of 2.5 s.
     assert "at most 7.98 m/s" in says
     assert "vehicle.scan_duration_s at most 1.99 s" in says
     assert "drives 12.5 m" in says
-    validation.check(changed(vehicle=MOVING | {"scan_duration_s": 1.99}))
+    raw["vehicle"]["scan_duration_s"] = 1.99
+    validation.check(raw)
+
+
+def test_positions_that_the_vehicle_draws_apart_are_refused():
+    # 0.2 m a step: over the scene y / r goes from 0.95 to 0.99 and x / r to -0.24 at the near edge:
+    # out and back 16 mm, and 5 mm by the cart's own step. A turn is 20 mm.
+    vehicle = MOVING | {"forward_speed_m_per_s": 8.0, "scan_duration_s": 2.0}
+    says = faults(changed(vehicle=vehicle))["vehicle.forward_speed_m_per_s"]
+    assert "drives 0.2 m from one antenna position" in says
+    validation.check(changed(vehicle=vehicle | {"scan_duration_s": 1.5}))
 
 
 def test_the_way_of_the_vehicle_counts_for_the_unambiguous_range():
