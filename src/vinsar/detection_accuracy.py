@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,9 @@ HEIGHT_THRESHOLDS = np.round(np.arange(0.01, 0.401, 0.01), 2)
 
 AMPLITUDE_THRESHOLDS = 10 ** (np.arange(0.5, 15.01, 0.5) / 10)
 """Thresholds of the 2-D detector's ROC: power ratios of 0.5 to 15 dB."""
+
+# Heights closer than this are the same.
+_SLACK_M = 1e-9
 
 
 def evaluate(
@@ -122,3 +126,56 @@ def _flags(rows: list[list[bool]], objects: int) -> Flags:
 
 def _share(mask: Flags, where: Flags) -> float:
     return float(mask[where].mean()) if where.any() else np.nan
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A detector's ROC over the realizations of a case.
+
+    Attributes
+    ----------
+    threshold
+        Thresholds, m or power ratios, rising.
+    probability
+        Share of the objects that are found, by threshold.
+    false_alarms
+        Mean number of false alarms on 100 m2, by threshold.
+    """
+
+    threshold: Floats
+    probability: Floats
+    false_alarms: Floats
+
+    def at(self, probability: float) -> tuple[float, float] | None:
+        """Return the highest threshold that finds so many, and its false alarms on 100 m2."""
+        enough = np.nonzero(self.probability >= probability)[0]
+        if not enough.size:
+            return None
+        return float(self.threshold[enough[-1]]), float(self.false_alarms[enough[-1]])
+
+
+def curves(case: xr.Dataset, least_height_m: float) -> dict[str, Curve]:
+    """Return the ROC of both detectors for obstacles above ground.
+
+    Parameters
+    ----------
+    case
+        One case of a sweep over a scene with objects: product ``sweep`` without swept keys.
+    least_height_m
+        Height from which an obstacle counts, m.
+
+    Returns
+    -------
+    dict of Curve
+        For ``height`` and ``amplitude``.
+    """
+    counts = case["object_height"].isel(realization=0).values >= least_height_m - _SLACK_M
+    result = {}
+    for name in ("height", "amplitude"):
+        found = case[f"{name}_found"].mean("realization").transpose(..., "object").values
+        false = case[f"{name}_false_alarms"] / case["scene_area"]
+        probability = found[:, counts].mean(axis=1) if counts.any() else np.full(len(found), np.nan)
+        result[name] = Curve(
+            case[f"{name}_threshold"].values, probability, 100 * false.mean("realization").values
+        )
+    return result

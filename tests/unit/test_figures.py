@@ -23,6 +23,7 @@ from matplotlib.text import Text
 from vinsar import (
     baseline,
     config,
+    detection_accuracy,
     figures,
     geometry,
     motion,
@@ -49,6 +50,7 @@ NAMES = [
     "summary",
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
     *("baseline_length", "baseline_angle", "baseline_vibration", "snr", "moving"),
+    *("obstacles", "roc"),
 ]
 NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr"}
 # The front sheet is a slide, whatever the journal's columns and text are.
@@ -64,6 +66,14 @@ SMALL: dict[str, dict[str, Any]] = {
         "terrain_spacing_m": 0.05,
         "facet_size_m": 0.04,
         "peak_height_m": 0.2,
+        "objects": [
+            {"shape": "box", "x_m": 0.4, "y_m": 11.4, "size_x_m": 0.3, "size_y_m": 0.2}
+            | {"height_m": 0.1, "rotation_deg": 20.0},
+            {"shape": "pit", "x_m": -0.3, "y_m": 11.4, "diameter_m": 0.3, "depth_m": 0.1},
+        ],
+        "patches": [
+            {"x_m": 0.0, "y_m": 10.6, "size_x_m": 0.3, "size_y_m": 0.3, "reflectivity": 3.0}
+        ],
     },
     "imaging": {
         "x_min_m": -0.8,
@@ -82,8 +92,9 @@ SMALL: dict[str, dict[str, Any]] = {
 
 def make_study(**sections: dict[str, Any]) -> config.Study:
     values = yaml.safe_load(PAPER.read_text(encoding="utf-8"))
-    moving = yaml.safe_load(PAPER.with_name("moving.yaml").read_text(encoding="utf-8"))
-    values["sweeps"] |= moving["sweeps"]
+    for other in ("moving", "obstacles"):
+        text = PAPER.with_name(f"{other}.yaml").read_text(encoding="utf-8")
+        values["sweeps"] |= yaml.safe_load(text)["sweeps"]
     for name, section in sections.items():
         values[name] |= section
     return config.Study.model_validate(values)
@@ -121,6 +132,37 @@ def make_sweep(
     return variables.sweep_dataset(data, swept)
 
 
+def make_found(roughness: list[float], realizations: int = 4) -> xr.Dataset:
+    """Make a sweep over the scene of `SMALL`: a box that is found up to 5 cm, a pit that is not."""
+    heights = detection_accuracy.HEIGHT_THRESHOLDS
+    ratios = detection_accuracy.AMPLITUDE_THRESHOLDS
+    found = np.stack([heights < 0.055, heights < 0], axis=-1)
+    seen = np.stack([ratios < 2, ratios < 1.5], axis=-1)
+    data = {
+        "object_x": np.array([0.4, -0.3]),
+        "object_y": np.array([11.4, 11.4]),
+        "object_height": np.array([0.1, -0.1]),
+        "height_found": found,
+        "height_false_alarms": np.round(2 * np.exp(-heights / 0.02)),
+        "amplitude_found": seen,
+        "amplitude_false_alarms": np.round(8 * np.exp(-ratios / 2)),
+        "object_unknown": np.array([0.1, 0.6]),
+        "object_free": np.array([0.2, 0.4]),
+        "shadow_unknown": np.array(0.7),
+        "visible_unknown": np.array(0.02),
+        "scene_area": np.array(4.0),
+    }
+    shape = (len(roughness), realizations)
+    data = {name: np.broadcast_to(value, (*shape, *value.shape)) for name, value in data.items()}
+    plain = make_sweep({"scene.roughness_std_m": roughness}, np.full(shape[0], 0.02), realizations)
+    swept = {"scene_roughness_std_m": (np.array(roughness), {"long_name": "roughness"})}
+    coords = {
+        "height_threshold": heights, "amplitude_threshold": ratios, "object": np.arange(2)
+    }  # fmt: skip
+    data |= {str(name): values.values for name, values in plain.data_vars.items()}
+    return variables.sweep_dataset(data, swept, coords)
+
+
 def all_sweeps(study: config.Study) -> pipeline.Products:
     """Make the sweeps that the paper's configuration describes, with made up heights."""
     made = {}
@@ -130,6 +172,9 @@ def all_sweeps(study: config.Study) -> pipeline.Products:
         # From 1 cm to half a metre along the last key, another size along the others.
         steps = np.geomspace(0.01, 0.5, shape[-1])
         others = 1 + 0.3 * np.arange(int(np.prod(shape[:-1]))).reshape(shape[:-1])
+        if name == "roughness":
+            made[f"sweeps/{name}"] = make_found(over["scene.roughness_std_m"])
+            continue
         made[f"sweeps/{name}"] = make_sweep(over, others[..., None] * steps)
     return made
 
@@ -817,6 +862,49 @@ def test_a_wrong_speed_shows_the_heights_of_other_places(products: pipeline.Prod
     assert found == pytest.approx(1e-4 * float(inner["y"].std()), rel=0.03)
     both = moving.predicted_std(terrain, inner, true_slope=0.2, told_slope=0.201, floor_m=1e-4)
     assert both == pytest.approx(np.hypot(found, 1e-4))
+
+
+def test_roc_shows_the_counts_of_the_sweep(
+    products: pipeline.Products, study: config.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = draw("roc", products, study)
+    curves, by_height, holes = figure.axes
+    lines = lines_of(curves)
+    # The box is found up to a threshold of 5 cm; on 4 m2, n false alarms are 25 n on 100 m2.
+    heights = detection_accuracy.HEIGHT_THRESHOLDS
+    line = lines["heights, 1 cm"]
+    np.testing.assert_array_equal(line.get_ydata(), heights < 0.055)
+    np.testing.assert_allclose(line.get_xdata(), 25 * np.round(2 * np.exp(-heights / 0.02)))
+    ratios = detection_accuracy.AMPLITUDE_THRESHOLDS
+    line = lines["image alone, 1 cm"]
+    np.testing.assert_array_equal(line.get_ydata(), ratios < 2)
+    np.testing.assert_allclose(line.get_xdata(), 25 * np.round(8 * np.exp(-ratios / 2)))
+    # One height at a distance is no curve.
+    assert len(by_height.lines) == 1
+    shares = [bar.get_width() for bar in holes.patches]
+    assert shares == pytest.approx([0, 60, 40])
+    assert "pit, 0.3 m long, 10 cm deep, at 11.4 m" in written(figure, monkeypatch)
+
+
+def test_obstacles_are_outlined_where_they_are(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    for axes in draw("obstacles", products, study).axes:
+        if axes.images and axes.get_xlabel() == "x (m)":
+            box, pit = axes.patches[:2]
+            x, y = 0.15 * np.array([-1, 1]), 0.1 * np.array([-1, 1])
+            turn = np.deg2rad(20)
+            corner = [
+                (
+                    0.4 + a * np.cos(turn) - b * np.sin(turn),
+                    11.4 + a * np.sin(turn) + b * np.cos(turn),
+                )
+                for a in x
+                for b in y
+            ]
+            found = box.get_patch_transform().transform([(0, 0), (0, 1), (1, 0), (1, 1)])
+            np.testing.assert_allclose(found, corner, atol=1e-9)
+            assert pit.center == (-0.3, 11.4)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("name", [*OF_SWEEPS, "baseline_angle"])

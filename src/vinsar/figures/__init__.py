@@ -19,6 +19,7 @@ from vinsar.figures import (
     height_error,
     moving,
     noise,
+    obstacles,
     registration_error,
     summary,
     vibration,
@@ -153,8 +154,13 @@ FIGURES: dict[str, Figure] = {
         ("figures", "radar", "imaging", "vehicle"),
         ("speed", "speed_error"),
     ),
+    "obstacles": Figure(obstacles.draw_map, ("truth", "dem", "detections"), ("figures", "scene")),
+    "roc": Figure(
+        obstacles.draw_roc, (), ("figures", "scene", "detection", "sweeps"), (obstacles.SWEEP,)
+    ),
 }
-"""The figures by name: the paper's in its order, then those of its section 1.2 and of noise."""
+"""The figures by name: the paper's in its order, then those of its section 1.2, of noise, and of
+obstacles."""
 
 
 def check(study: config.Study) -> None:

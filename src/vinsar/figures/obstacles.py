@@ -1,0 +1,267 @@
+"""Obstacles and holes: where they are, what is found of them, and how often."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar import config, detection, detection_accuracy, variables
+from vinsar.figures import maps, style, sweeps
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from vinsar.pipeline import Products
+
+SWEEP = "roughness"
+"""The sweep that `draw_roc` shows."""
+
+_CLASSES = {
+    detection.FREE: ("free", "#f2f2ee"),
+    detection.OBSTACLE: ("obstacle", style.ORANGE),
+    detection.HOLE: ("hole", style.BLUE),
+    detection.UNKNOWN: ("unknown", "#9a9fa4"),
+}
+_PATCH = "#35a7e8"
+_LEAST_RANGE_M = 0.05
+_WANTED = 0.9
+
+_HEIGHT = [
+    sweeps.Look("", style.BLUE, "-", "o"),
+    sweeps.Look("", style.BLUE, (0, (4, 1.5)), "s"),
+    sweeps.Look("", style.BLUE, (0, (1, 1.2)), "^"),
+]
+_AMPLITUDE = sweeps.Look("image alone", style.ORANGE, (0, (4, 1.2, 1, 1.2)), "D")
+_DISTANCES = [
+    sweeps.Look("", style.INK, "-", "o"),
+    sweeps.Look("", style.BLUE, (0, (4, 1.5)), "s"),
+    sweeps.Look("", style.ORANGE, (0, (4, 1.2, 1, 1.2)), "^"),
+]
+
+
+@style.styled
+def draw_map(products: Products, study: config.Study) -> Figure:
+    """Draw the scene, an image, the reconstructed heights, and the map of what is found.
+
+    Parameters
+    ----------
+    products
+        ``truth``, ``images``, ``dem``, ``detections``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    truth, found = products["truth"]["height"], products["detections"]
+    top = max(_LEAST_RANGE_M, float(np.nanmax(truth)))
+    colours = style.colormap(study.figures.height_colormap, "figures.height_colormap")
+    width = 57.0
+    _, tall = maps.fit(truth, width, 88)
+    rows = (22.0 + tall + 17.0, 22.0)
+    figure = style.new_figure(style.TWO_COLUMNS_MM, rows[0] + tall + 7)
+    boxes = [(left, bottom, width, tall) for bottom in rows for left in (13.0, 104.0)]
+
+    for box, data, title in (
+        (boxes[0], truth, "(a) true height"),
+        (boxes[2], products["dem"]["height"], "(c) reconstructed height"),
+    ):
+        axes = maps.place(figure, data, box, title)
+        image = maps.draw(axes, 100 * data, colormap=colours, limits=(-100 * top, 100 * top))
+        ends = maps.beyond(data.values, (-top, top))
+        maps.colorbar(axes, image, "height (cm)", extend=ends)
+        _outline(axes, study.scene.objects)
+
+    contrast = found["contrast"]
+    power = contrast.copy(data=10 * np.log10(np.maximum(contrast.values, 1e-4)))
+    axes = maps.place(figure, power, boxes[1], "(b) power of the images over its surroundings")
+    limits = (-10.0, 10.0)
+    image = maps.draw(axes, power, colormap=style.colormap("gray"), limits=limits)
+    maps.colorbar(axes, image, "power ratio (dB)", extend=maps.beyond(power.values, limits))
+    _outline(axes, study.scene.objects)
+    _outline(axes, study.scene.patches, _PATCH, linestyle=(0, (3, 1.5)))
+    if found["bright"].values.any():
+        axes.contour(
+            found["x"], found["y"], found["bright"], levels=[0.5], colors=style.ORANGE, linewidths=1
+        )
+
+    from matplotlib.colors import ListedColormap
+
+    axes = maps.place(figure, found["map_class"], boxes[3], "(d) map of what is found")
+    palette = ListedColormap([colour for _, colour in _CLASSES.values()])
+    maps.draw(axes, found["map_class"], colormap=palette, limits=(-0.5, 3.5))
+    _outline(axes, study.scene.objects)
+    _explain(figure)
+    return figure
+
+
+def _outline(axes: Axes, parts: Any, colour: str = "black", linestyle: Any = "-") -> None:
+    from matplotlib import patheffects
+    from matplotlib.patches import Circle, Rectangle
+
+    look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linestyle": linestyle}
+    # A light casing keeps the line visible on dark ground.
+    casing = [patheffects.withStroke(linewidth=1.6, foreground="white")]
+    look |= {"linewidth": 0.8, "path_effects": casing if colour == "black" else None}
+    for part in parts:
+        if hasattr(part, "diameter_m"):
+            axes.add_patch(Circle((part.x_m, part.y_m), part.diameter_m / 2, **look))
+        else:
+            corner = (part.x_m - part.size_x_m / 2, part.y_m - part.size_y_m / 2)
+            axes.add_patch(
+                Rectangle(
+                    corner,
+                    part.size_x_m,
+                    part.size_y_m,
+                    angle=part.rotation_deg,
+                    rotation_point="center",
+                    **look,
+                )
+            )
+
+
+def _explain(figure: Figure) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = [
+        Line2D([], [], color="black", linewidth=0.8, label="true obstacle or hole"),
+        Line2D([], [], color=_PATCH, linewidth=0.8, linestyle=(0, (3, 1.5)), label="bright patch"),
+        Line2D([], [], color=style.ORANGE, linewidth=1, label="alarm of the image alone"),
+    ]
+    handles += [
+        Patch(facecolor=colour, edgecolor=style.GREY, linewidth=0.5, label=label)
+        for label, colour in _CLASSES.values()
+    ]
+    sweeps.legend(figure, handles, 13.0, 2.0, 4)
+
+
+@style.styled
+def draw_roc(products: Products, study: config.Study) -> Figure:
+    """Draw detection against false alarms, detection against height, and what holes become.
+
+    Parameters
+    ----------
+    products
+        ``sweeps/roughness``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    key = "scene_roughness_std_m"
+    sweep = variables.swept(products[f"sweeps/{SWEEP}"], key).sortby(key)
+    options = config.swept_section(study, SWEEP, "detection")
+    middle = sweep.isel({key: sweep.sizes[key] // 2})
+    sunk = int((middle["object_height"].isel(realization=0) < 0).sum())
+    bottom = 30.0 + 5.0 * sunk
+    figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + 70.0)
+    _draw_curves(style.place(figure, 13.0, bottom, 72.0, 63.0), sweep, options)
+    _draw_by_height(style.place(figure, 104.0, bottom, 72.0, 63.0), middle, options)
+    if sunk:
+        objects = config.swept_section(study, SWEEP, "scene").objects
+        _draw_holes(style.place(figure, 58.0, 13.0, 118.0, 5.0 * sunk), middle, objects)
+    return figure
+
+
+def _draw_curves(axes: Axes, sweep: xr.Dataset, options: config.Detection) -> None:
+    key = "scene_roughness_std_m"
+    most = 1.0
+    for number, look in enumerate(_HEIGHT[: sweep.sizes[key]]):
+        case = sweep.isel({key: number})
+        curve = detection_accuracy.curves(case, options.threshold_m)["height"]
+        label = f"heights, {100 * float(case[key]):g} cm"
+        _curve(axes, curve, look, label)
+        at = int(np.abs(curve.threshold - options.threshold_m).argmin())
+        axes.plot(
+            curve.false_alarms[at], curve.probability[at], marker="*", markersize=8,
+            color=look.colour, markeredgecolor="white", markeredgewidth=0.5, zorder=5,
+        )  # fmt: skip
+        most = max(most, float(curve.false_alarms.max()))
+    middle = sweep.isel({key: sweep.sizes[key] // 2})
+    curve = detection_accuracy.curves(middle, options.threshold_m)["amplitude"]
+    _curve(axes, curve, _AMPLITUDE, f"image alone, {100 * float(middle[key]):g} cm")
+    most = max(most, float(curve.false_alarms.max()))
+    axes.axhline(_WANTED, color=style.GREY, linestyle=":", linewidth=0.8)
+    axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
+    axes.set_xlim(-0.015, 1.6 * most)
+    axes.set_ylim(0, 1.03)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xlabel("false alarms on 100 m²")
+    axes.set_ylabel("probability of detection")
+    axes.set_title(f"(a) obstacles of {100 * options.threshold_m:g} cm and more")
+    mark = f"threshold of {100 * options.threshold_m:g} cm"
+    axes.plot([], [], linestyle="", marker="*", markersize=7, color=_HEIGHT[0].colour, label=mark)
+    axes.legend(
+        title="detector, roughness of the ground", loc="center left", bbox_to_anchor=(0.05, 0.42),
+        alignment="left",
+    )  # fmt: skip
+
+
+def _curve(axes: Axes, curve: detection_accuracy.Curve, look: sweeps.Look, label: str) -> None:
+    axes.plot(
+        curve.false_alarms, curve.probability, color=look.colour, linestyle=look.line,
+        marker=look.marker, markersize=2.5, markerfacecolor="white", markeredgewidth=0.6,
+        label=label,
+    )  # fmt: skip
+
+
+def _draw_by_height(axes: Axes, case: xr.Dataset, options: config.Detection) -> None:
+    first = case.isel(realization=0)
+    height, distance = first["object_height"].values, first["object_y"].values
+    at = case["height_found"].sel(height_threshold=options.threshold_m, method="nearest")
+    found = at.mean("realization").values
+    raised = {y: np.nonzero((distance == y) & (height > 0))[0] for y in np.unique(distance)}
+    rows = [(y, chosen) for y, chosen in raised.items() if np.unique(height[chosen]).size > 1]
+    for (y, chosen), look in zip(rows, _DISTANCES, strict=False):
+        order = chosen[np.argsort(height[chosen])]
+        axes.plot(
+            100 * height[order], found[order], color=look.colour, linestyle=look.line,
+            marker=look.marker, markerfacecolor="white", label=f"{y:g} m ahead",
+        )  # fmt: skip
+    axes.axvline(100 * options.threshold_m, color=style.GREY, linestyle=":", linewidth=0.8)
+    axes.set_xlim(0, None)
+    axes.set_ylim(0, 1.03)
+    axes.set_xlabel("height of the obstacle (cm)")
+    axes.set_ylabel("probability of detection")
+    axes.set_title(f"(b) detection at a threshold of {100 * options.threshold_m:g} cm")
+    if rows:
+        axes.legend(loc="lower right")
+
+
+def _draw_holes(axes: Axes, case: xr.Dataset, objects: tuple[config.SceneObject, ...]) -> None:
+    mean = case.mean("realization")
+    holes = np.array([n for n, part in enumerate(objects) if hasattr(part, "depth_m")])[::-1]
+    unknown, free = (mean[name].values[holes] for name in ("object_unknown", "object_free"))
+    shares = {
+        detection.HOLE: 1 - unknown - free,
+        detection.UNKNOWN: unknown,
+        detection.FREE: free,
+    }
+    left = np.zeros(holes.size)
+    for kind, share in shares.items():
+        label, colour = _CLASSES[kind]
+        label = "hole or obstacle" if kind == detection.HOLE else label
+        axes.barh(
+            np.arange(holes.size), 100 * share, left=100 * left, height=0.7, color=colour,
+            edgecolor=style.GREY, linewidth=0.5, label=label,
+        )  # fmt: skip
+        left += share
+    axes.set_yticks(np.arange(holes.size), [_describe(objects[n]) for n in holes])
+    axes.set_xlim(0, 100)
+    axes.set_xlabel("share of the hole's ground on the map (%)")
+    axes.set_title("(c) what the map says of holes")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.2)
+
+
+def _describe(part: Any) -> str:
+    length = part.diameter_m if hasattr(part, "diameter_m") else part.size_y_m
+    return f"{part.shape}, {length:g} m long, {100 * part.depth_m:g} cm deep, at {part.y_m:g} m"
