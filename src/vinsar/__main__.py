@@ -1,12 +1,13 @@
-"""The commands on results: ``trace``, ``verify``, ``diff``, ``reproduce``, ``crate``."""
+"""The design sheet, and the commands on results: `trace`, `verify`, `diff`, `reproduce`, `crate`."""
 
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from pathlib import Path
 
-from vinsar import config, lineage, reproduction, validation
+from vinsar import config, design, lineage, reproduction, validation
 
 
 def _study(name: str, files: list[str]) -> config.Study | None:
@@ -51,6 +52,23 @@ def _diff(arguments: argparse.Namespace) -> int:
     lines = lineage.compare(arguments.first, arguments.second)
     sys.stdout.write("".join(f"{line}\n" for line in lines) or "no difference\n")
     return int(bool(lines))
+
+
+def _design(arguments: argparse.Namespace) -> int:
+    study = validation.load("config/paper.yaml", *arguments.configfile)
+    sys.stdout.write(design.as_markdown(design.Sheet(study)))
+    sys.stdout.flush()
+    # The workflow keeps the sheet and draws it; --nolock, because a study may be running.
+    files = ["--configfile", *arguments.configfile] if arguments.configfile else []
+    targets = ["design", "figure_design", "--nolock", "--quiet", "all"]
+    command = [sys.executable, "-m", "snakemake", *targets, *files]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)  # noqa: S603
+    if done.returncode:
+        sys.stderr.write(done.stdout + done.stderr)
+        return done.returncode
+    folder, ends = f"results/{study.study}", ", ".join(study.figures.formats)
+    sys.stdout.write(f"\nKept as {folder}/design.md, drawn as {folder}/figures/design ({ends}).\n")
+    return 0
 
 
 def _reproduce(arguments: argparse.Namespace) -> int:
@@ -108,12 +126,14 @@ def main() -> int:
     packed.add_argument("folder")
     packed.add_argument("--agent", default="", help="name of the person who ran the study")
     packed.set_defaults(answer=_crate)
-    for parser_ in (trace, verify, again, packed):
+    sheet = commands.add_parser("design", help="what a configuration will do, without running it")
+    sheet.set_defaults(answer=_design)
+    for parser_ in (trace, verify, again, packed, sheet):
         parser_.add_argument(
             "--configfile",
             nargs="+",
             default=[],
-            help="what the study was run with, if not its own",
+            help="files that the study is configured with, if not its own",
         )
     diff = commands.add_parser("diff", help="what differs between two studies")
     diff.add_argument("first")

@@ -1,6 +1,9 @@
-# The figures, each as PDF, SVG and PNG; the panels of the third are drawn together.
+# The figures, each as PDF, SVG and PNG; the panels of the third are drawn together. That of the design
+# sheet can be asked for in any study.
 
-for FIGURE in [*SINGLE, "fig3_panels"] if PANELS else SINGLE:
+for FIGURE in dict.fromkeys(
+    [*SINGLE, *(["fig3_panels"] if PANELS else []), "design"]
+):
 
     rule:
         name:

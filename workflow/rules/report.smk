@@ -77,3 +77,18 @@ rule report:
         configuration=configuration(*study_report.SECTIONS),
     script:
         "../scripts/report.py"
+
+
+rule design:
+    input:
+        code=sources_of("design", script="design"),
+    output:
+        "<results>/design.md",
+    log:
+        "<logs>/design.log",
+    benchmark:
+        "<benchmarks>/design.tsv"
+    params:
+        configuration=STUDY.model_dump(mode="json"),
+    script:
+        "../scripts/design.py"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from vinsar import validation
+from vinsar import design, validation
 from vinsar.figures import (
     acquisition,
     baselines,
@@ -20,6 +20,7 @@ from vinsar.figures import (
     moving,
     noise,
     obstacles,
+    prediction,
     registration_error,
     summary,
     vibration,
@@ -157,6 +158,13 @@ FIGURES: dict[str, Figure] = {
     "obstacles": Figure(obstacles.draw_map, ("truth", "dem", "detections"), ("figures", "scene")),
     "roc": Figure(
         obstacles.draw_roc, (), ("figures", "scene", "detection", "sweeps"), (obstacles.SWEEP,)
+    ),
+    "design": Figure(prediction.draw_sheet, (), ("figures", *design.SECTIONS)),
+    "design_check": Figure(
+        prediction.draw_check,
+        (),
+        ("figures", "sweeps", *design.SECTIONS),
+        ("snr", "baseline_length", "vibration"),
     ),
 }
 """The figures by name: the paper's in its order, then those of its section 1.2, of noise, and of

@@ -1,0 +1,221 @@
+"""The design sheet: formulas of the rail where there are some, finite differences elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vinsar import aperture, baseline, config, design, geometry, radar, trajectory, validation
+
+CONFIG = Path(__file__).parents[2] / "config"
+WAVELENGTH = 299_792_458.0 / 14e9
+PAPER = validation.load(CONFIG / "paper.yaml")
+
+
+def study_with(**sections: dict[str, Any]) -> config.Study:
+    raw = PAPER.model_dump(mode="json") | {"sweeps": {}, "variants": {}}
+    return validation.check(validation.merge(raw, sections))
+
+
+def sheet_of(antennas=None, **sections) -> design.Sheet:
+    made = design.Sheet(study_with(**sections))
+    if antennas is not None:
+        made.__dict__["antennas"] = antennas
+    return made
+
+
+def exact_height_error(true, told, x, y):
+    """Invert the true phase of a target on the ground with the told upper antenna."""
+    lower, upper = trajectory.apertures(true)
+    phase = aperture.interferometric_phase(lower, upper, x, y, 0.0, WAVELENGTH)
+    *_, height = aperture.locate(lower, trajectory.apertures(told)[1], x, y, phase, WAVELENGTH)
+    return float(height)
+
+
+def array(rail):
+    """Transmitters at two heights and one row of receivers."""
+    receivers = rail.isel(channel=[0, 0])["receiver"].values + np.array([0.0, 0.1, 0.2])
+    transmitters = rail["transmitter"].values * [0.0, 1.0, 1.0]
+    return rail.assign(
+        receiver=rail["receiver"].copy(data=receivers),
+        transmitter=rail["transmitter"].copy(data=transmitters),
+    )
+
+
+@pytest.mark.parametrize("angle", [30.0, 60.0, 90.0, 120.0])
+def test_of_a_rail_the_height_of_ambiguity_is_the_paper_s(angle):
+    sheet = sheet_of(radar={"baseline_angle_deg": angle})
+    lower, upper = (part.center for part in sheet.apertures)
+    r1, r2 = (geometry.slant_range(end, 0.0, sheet.places) for end in (lower, upper))
+    look = geometry.look_angle(lower, 0.0, sheet.places)
+    formula = geometry.height_of_ambiguity(r1, WAVELENGTH, 0.3, np.deg2rad(angle), look)
+    # The exact slope has r2 where the formula has r1.
+    np.testing.assert_allclose(
+        sheet.height_of_ambiguity(sheet.places), formula * r2 / r1, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("angle", [30.0, 60.0, 90.0, 120.0])
+def test_of_a_rail_length_and_attitude_of_the_baseline_are_eqs_5_and_12_with_their_exact_terms(
+    angle,
+):
+    sheet = sheet_of(radar={"baseline_angle_deg": angle})
+    length, attitude, *_ = sheet.offsets()
+    for number, y in enumerate(sheet.places):
+        seen = baseline.View(2.0, 0.0, float(y), WAVELENGTH, 0.075, np.deg2rad(angle))
+        expected = baseline.height_per_length(seen, 0.3, np.deg2rad(angle))
+        assert length.per_unit[number] / 1e-3 == pytest.approx(float(expected), rel=1e-6)
+        eq12 = geometry.height_per_baseline_angle(seen.slant_range, seen.look)
+        assert attitude.per_unit[number] == pytest.approx(np.deg2rad(float(eq12)), rel=1e-6)
+
+
+@pytest.mark.parametrize("arrangement", ["rail", "array"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize(("x", "y"), [(0.0, 13.0), (1.5, 10.0)])
+def test_an_offset_moves_the_height_as_the_exact_inversion_does(rail, arrangement, axis, x, y):
+    true = rail if arrangement == "rail" else array(rail)
+    step = 1e-4 * np.eye(3)[axis]
+    end = "transmitter"
+    moved = {end: true[end].copy(data=true[end].values + np.array([0, 1])[:, None, None] * step)}
+    if arrangement == "rail":
+        moved["receiver"] = moved[end]
+    sheet = sheet_of(true)
+    found = float(sheet.height_per_offset(x, y, np.eye(3)[axis]))
+    # Second order of a tenth of a millimetre: 1e-4 / B of the height error itself.
+    expected = exact_height_error(true, true.assign(moved), x, y) / 1e-4
+    assert found == pytest.approx(expected, rel=2e-3, abs=1e-3)
+
+
+def test_a_pair_of_transmitters_has_twice_the_height_of_ambiguity_and_resolution_of_the_rail(rail):
+    # Exactly so with the receivers where the lower transmitter is, and to a few per cent elsewhere.
+    one, other = sheet_of(rail), sheet_of(array(rail))
+    y = one.places
+    np.testing.assert_allclose(
+        other.height_of_ambiguity(y), 2 * one.height_of_ambiguity(y), rtol=0.06
+    )
+    np.testing.assert_allclose(other.resolution(y)[0], 2 * one.resolution(y)[0], rtol=0.02)
+    width = [one.unambiguous_width(13.0), other.unambiguous_width(13.0)]
+    assert width[1] > 1.9 * width[0]
+
+
+def test_a_short_baseline_has_the_critical_baseline_of_the_paper():
+    sheet = sheet_of(radar={"baseline_m": 1e-3})
+    look, range_ = sheet.look(sheet.places), sheet.slant_range(sheet.places)
+    across = geometry.critical_baseline(range_, WAVELENGTH, look, sheet.range_resolution)
+    # To first order of B / H0 = 5e-4; its part across the line of sight is sin(theta) of it.
+    np.testing.assert_allclose(
+        sheet.critical_baseline(sheet.places) * np.sin(look), across, rtol=1e-3
+    )
+
+
+def test_grating_lobes_bound_the_width():
+    sheet = sheet_of()
+    width, slant = sheet.unambiguous_width(13.0), float(sheet.slant_range(13.0))
+    # 4 d sin(squint) = the shortest wavelength; the aperture's ends change the mean by (L / r)^2.
+    sine = (width / 2) / np.hypot(width / 2, slant)
+    assert sine == pytest.approx(radar.wavelength(15e9) / (4 * 0.01), rel=2e-3)
+    dense = sheet_of(radar={"position_spacing_m": 0.004})
+    assert dense.unambiguous_width(13.0) == np.inf
+
+
+def test_an_obstacle_hides_what_a_ray_over_its_top_misses():
+    assert sheet_of().shadow_length(10.0) == pytest.approx(10.0 * 0.3 / 1.7)
+    low = sheet_of(radar={"rail_height_m": 0.25})
+    assert low.shadow_length(10.0) == np.inf
+
+
+def test_the_reference_takes_what_is_constant_over_the_image():
+    for error in sheet_of().offsets():
+        assert error.tolerated_referenced >= error.tolerated * 0.999, error.name
+    # One millimetre ahead is 4 cm at once, by a phase that is nearly the same everywhere.
+    ahead = next(error for error in sheet_of().offsets() if error.name.endswith("along y"))
+    assert ahead.per_unit[1] == pytest.approx(-0.0433, abs=1e-3)
+    assert ahead.tolerated_referenced > 20 * ahead.tolerated
+
+
+def test_noise_grows_with_what_makes_noise():
+    y = np.array([10.0, 16.0])
+    quiet = sheet_of().height_std(y)
+    assert (sheet_of(echo={"snr_db": 5.0}).height_std(y) > 1.5 * quiet).all()
+    assert (sheet_of(interferogram={"coherence_window_px": 15}).height_std(y) < 0.6 * quiet).all()
+    assert (sheet_of().height_std(y, 0.5) > 1.2 * quiet).all()
+    # A random phase is the worst.
+    most = sheet_of().height_of_ambiguity(y) / np.sqrt(12)
+    np.testing.assert_allclose(sheet_of().height_std(y, 5.0), most)
+
+
+def test_the_noise_is_the_cramer_rao_bound_of_the_baseline_s_figures():
+    sheet = sheet_of(echo={"snr_db": 10.0})
+    seen = baseline.view(sheet.study.radar, sheet.study.scene)
+    coherence = 10 / 11 * (1 - 0.3 * np.sin(seen.look) / seen.critical_baseline)
+    bound = seen.height_std_bound(0.3, coherence, 1.0)
+    # The formulas take the wave for plane: B / 2 H0 = 7.5 % of the decorrelation.
+    assert sheet.height_std(13.0) == pytest.approx(float(bound), rel=0.02)
+
+
+def test_spreading_makes_the_far_edge_noisier():
+    sheet = sheet_of(echo={"snr_db": 20.0, "spreading": True})
+    near, middle, far = sheet.snr_db(sheet.places)
+    assert middle == pytest.approx(20.0)
+    assert near - far == pytest.approx(40 * np.log10(np.hypot(16, 2) / np.hypot(10, 2)), abs=1e-9)
+
+
+def test_tolerated_errors_meet_the_tolerance():
+    sheet = sheet_of()
+    for axis in range(3):
+        std = sheet.tolerated_scatter(axis)
+        x = np.array([-2.5, 0.0, 2.5])[:, None]
+        slope = sheet.phase_per_position(x, sheet.places, axis).max(axis=0)
+        assert 1.96 * sheet.height_std(sheet.places, std * slope).max() == pytest.approx(0.05)
+    # Ahead, the path changes by all of the error, up by its share H / r only.
+    assert sheet.tolerated_scatter(2) > 4 * sheet.tolerated_scatter(1)
+    assert sheet_of(accuracy={"tolerance_m": 0.01}).tolerated_scatter(1) == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"radar": {"frequency_count": 225}}, "unambiguous range"),
+        ({"radar": {"position_spacing_m": 0.8 / 44}}, "imaged once"),
+        ({"imaging": {"grid_spacing_m": 0.05}}, "undersampled"),
+        ({"echo": {"coupling_db": 60.0}}, "sidelobes are +8 dB"),
+        ({"echo": {"snr_db": 0.0}}, "fewer than 95 %"),
+        ({"radar": {"baseline_m": 1.0}}, "less than half the relief"),
+        ({"radar": {"rail_height_m": 0.25}}, "hides all that lies behind it"),
+        ({"radar": {"baseline_m": 2.5}}, "a quarter of the critical baseline"),
+    ],
+)
+def test_what_is_unwise_is_said(changes, words):
+    assert any(words in sentence for sentence in sheet_of(**changes).warnings())
+    assert not any(words in sentence for sentence in sheet_of().warnings())
+
+
+def test_suppression_ends_the_warning_of_the_coupling():
+    for cure in ({"suppression": {"method": "gate"}}, {"imaging": {"range_window": "hann"}}):
+        sheet = sheet_of(echo={"coupling_db": 60.0}, **cure)
+        assert sheet.coupling_db() is None
+        assert not any("sidelobes" in sentence for sentence in sheet.warnings())
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_shipped_study_has_a_sheet(path):
+    study = validation.load(CONFIG / "paper.yaml", path)
+    text = design.as_markdown(design.Sheet(study))
+    assert text.startswith(f"# Design of the study {study.study}\n")
+    assert "nan" not in text
+    assert "-0.000" not in text
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    assert len(rows) > 20
+
+
+def test_the_sheet_of_the_paper_names_its_figures():
+    text = design.as_markdown(design.Sheet(PAPER))
+    for words in (
+        "wavelength 21.41 mm, slant-range resolution 7.49 cm",
+        "unambiguous range 29.98 m",
+        "| height of ambiguity (m) | 0.366 | 0.471 | 0.577 |",
+    ):
+        assert words in text
