@@ -51,8 +51,9 @@ NAMES = [
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
     *("baseline_length", "baseline_angle", "baseline_vibration", "snr", "moving"),
     *("obstacles", "roc"),
+    *("design", "design_check"),
 ]
-NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr"}
+NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr", "design_check"}
 # The front sheet is a slide, whatever the journal's columns and text are.
 SLIDES = {"summary": 338.7}
 FORMATS = ["pdf", "svg", "png"]

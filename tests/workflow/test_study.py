@@ -11,7 +11,10 @@ import xarray as xr
 from vinsar import accuracy, claims, figures, pipeline, storage, validation
 
 ROOT = Path(__file__).parents[2]
-OF_SWEEPS = {"figure_fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr"}
+OF_SWEEPS = {
+    "figure_fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr",
+    "figure_design_check",
+}  # fmt: skip
 FIGURE_RULES = {
     "figure_summary", "figure_fig1", "figure_fig2", "figure_fig3", "figure_fig3_panels",
     "figure_fig4", "figure_baseline_angle", *OF_SWEEPS,

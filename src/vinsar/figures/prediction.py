@@ -104,8 +104,8 @@ def _noise(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
     axes.plot(y, curves[0], color=style.INK, label=label)
     for level, line in _SNR_DB:
         if level != own:
-            echo = study.echo.model_copy(update={"snr_db": level})
-            other = design.Sheet(study.model_copy(update={"echo": echo}))
+            parts = {name: getattr(study, name) for name in design.SECTIONS}
+            other = _changed(parts, echo={"snr_db": level})
             curves.append(100 * other.height_std(y))
             axes.plot(y, curves[-1], color=style.BLUE, linestyle=line, label=f"SNR {level:g} dB")
     limit = _limit(axes, sheet)
@@ -213,12 +213,13 @@ def draw_check(products: Products, study: config.Study) -> Figure:
 
 
 def _sheet(study: config.Study, sweep: str, **changes: dict[str, Any]) -> design.Sheet:
-    parts: dict[str, Any] = {
-        name: config.swept_section(study, sweep, name) for name in design.SECTIONS
-    }
-    for name, values in changes.items():
-        parts[name] = parts[name].model_copy(update=values)
-    return design.Sheet(config.Study.model_construct(**parts))
+    parts = {name: config.swept_section(study, sweep, name) for name in design.SECTIONS}
+    return _changed(parts, **changes)
+
+
+def _changed(parts: dict[str, Any], **changes: dict[str, Any]) -> design.Sheet:
+    changed = {name: parts[name].model_copy(update=values) for name, values in changes.items()}
+    return design.Sheet(config.Study.model_construct(**(parts | changed)))
 
 
 def _spread(sweep: Any) -> Floats:
