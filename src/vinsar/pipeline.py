@@ -58,6 +58,10 @@ _PROFILE_MARGIN_M = 0.5
 _POINT_MARGIN_M = 1.5
 
 
+# Range samples a resolution cell of the profiles that show the coupling, and targets along x.
+_PROFILE_SAMPLES, _TARGETS = 8, 17
+
+
 @dataclass(frozen=True)
 class Stage:
     """A step of the chain.
@@ -406,6 +410,83 @@ def _focus(products: Products, study: config.Study) -> xr.Dataset:
     )
 
 
+def _coupling(products: Products, study: config.Study) -> xr.Dataset:
+    antennas, clean, received = (products[name] for name in ("trajectory", "echo", "received"))
+    frequency, options = _frequency(study), study.suppression
+    swath = trajectory.range_extent(antennas, *image_axes(study.imaging))
+
+    def profiles(
+        data: xr.Dataset,
+        method: suppression.Method,
+        window: radar.WindowName,
+        extent: tuple[float, float],
+    ) -> xr.Dataset:
+        return imaging.compress(
+            suppression.suppress(data, method=method, gate_range_m=options.gate_range_m),
+            near_range_m=extent[0],
+            far_range_m=extent[1],
+            window=window,
+            oversampling=_PROFILE_SAMPLES,
+        )
+
+    def power(
+        data: xr.Dataset, method: suppression.Method = "none", window: radar.WindowName = "hann"
+    ) -> Floats:
+        profile = profiles(data, method, window, (0.0, swath[1]))["profile"].values
+        return np.asarray((np.abs(profile) ** 2).mean(axis=(0, 1)))
+
+    def image(method: suppression.Method, x: float, y: float) -> NDArray[np.complexfloating]:
+        target = np.array([[x, y, 0.0]])
+        point = variables.dataset("facets", {"facet_position": target, "reflectivity": np.ones(1)})
+        seen = echo.simulate(point, antennas, frequency=frequency, accuracy_db=None)
+        at = np.array([x]), np.array([y])
+        # A unit point target with uniform weighting: what is lost is lost to the suppression.
+        near, far = trajectory.range_extent(antennas, *at)
+        focused = imaging.backproject(
+            profiles(seen, method, "rectangular", (near, far)), antennas, x=at[0], y=at[1]
+        )
+        return np.asarray(focused["image"].values[:, 0, 0])
+
+    length = float(np.ptp(antennas["receiver"].values[..., 0]))
+    x = np.linspace(0, 1.5 * length, _TARGETS)
+    y = np.array([study.imaging.y_min_m, study.imaging.y_max_m])
+    slant_range = profiles(clean, "none", "hann", (0.0, swath[1]))["slant_range"].values
+    within = (slant_range >= swath[0]) & (slant_range <= swath[1])
+    windows: tuple[radar.WindowName, ...] = ("rectangular", "hann")
+    scene_power = power(clean, window="rectangular")
+    unit = scene_power[within].mean()
+    return variables.dataset(
+        "coupling",
+        {
+            "scene_power": scene_power / unit,
+            "power": [
+                [power(received, method, window) / unit for method in suppression.METHODS]
+                for window in windows
+            ],
+            "point_image": np.moveaxis(
+                np.array(
+                    [
+                        [[image(method, float(a), float(b)) for a in x] for b in y]
+                        for method in suppression.METHODS
+                    ]
+                ),
+                -1,
+                1,
+            ),
+            "common_share": suppression.common_share(
+                antennas, x[None, :], y[:, None], radar.wavelength(radar.carrier(frequency))
+            ),
+        },
+        {
+            "slant_range": slant_range,
+            "suppression": list(suppression.METHODS),
+            "weighting": list(windows),
+            "x": x,
+            "y": y,
+        },
+    )
+
+
 def _baseline_angle(products: Products, study: config.Study) -> xr.Dataset:
     del products
     options = study.baseline_errors
@@ -614,6 +695,12 @@ STAGES: dict[str, Stage] = {
         ("trajectory",),
         (*_WAVEFORM, "imaging", "registration"),
         ("registration", "echo", "imaging"),
+    ),
+    "coupling": Stage(
+        _coupling,
+        ("trajectory", "echo", "received"),
+        (*_WAVEFORM, *_GRID, "suppression.gate_range_m"),
+        ("suppression", "echo", "imaging", "trajectory"),
     ),
     "baseline_angle": Stage(
         _baseline_angle, (), (*_DRAWS, "radar", "scene", "baseline_errors"), ("baseline",)

@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 Method = Literal["none", "gate", "common", "both"]
+METHODS: tuple[Method, ...] = ("none", "gate", "common", "both")
 
-# Of a return inside the gate this much is left: -120 dB.
+# Of a return inside the gate about this much is left: -120 dB. The sequences that hold more of one
+# than that are as many as the range has cells, and fewer than these besides.
 _LEFT = 1e-6
+_EDGE = 24
 
 
 def suppress(echo: xr.Dataset, *, method: Method, gate_range_m: float) -> xr.Dataset:
@@ -108,8 +111,8 @@ def gate(echo: xr.Dataset, *, range_m: float) -> xr.Dataset:
 
     To blank a range profile would leave the sidelobes outside the blanked part. Here each spectrum
     is projected onto the complement of all spectra that returns from within the range can have.
-    Of a finite band these span few dimensions (Slepian 1978: the range over the resolution, and
-    some more for the edge), so that targets well outside lose little.
+    Of a finite band these span few dimensions, the discrete prolate spheroidal sequences (Slepian
+    1978): as many as the range has cells, and some for the edge. Targets well outside lose little.
 
     Parameters
     ----------
@@ -128,6 +131,8 @@ def gate(echo: xr.Dataset, *, range_m: float) -> xr.Dataset:
     ValueError
         If the range is not within the unambiguous range.
     """
+    from scipy.signal import windows
+
     samples, frequency = echo["echo"].values, echo["frequency"].values
     count = frequency.size
     step = float(frequency[-1] - frequency[0]) / (count - 1)
@@ -136,11 +141,12 @@ def gate(echo: xr.Dataset, *, range_m: float) -> xr.Dataset:
         raise ValueError(
             f"a gate of {range_m} m is not within the unambiguous range of {unambiguous:.2f} m"
         )
-    # Four ranges a resolution cell span what all ranges do.
-    inside = np.linspace(0, range_m, int(np.ceil(4 * range_m * count / unambiguous)) + 1)
-    spectra = np.exp(-4j * np.pi * np.outer(frequency, inside) / SPEED_OF_LIGHT)
-    basis, strength, _ = np.linalg.svd(spectra, full_matrices=False)
-    basis = basis[:, strength > _LEFT * strength[0]]
+    # Half the range is to the unambiguous range what the bandwidth is to the sampling rate.
+    bandwidth = range_m / 2 * count / unambiguous
+    most = min(count, int(np.ceil(2 * bandwidth)) + _EDGE)
+    sequences, inside = windows.dpss(count, bandwidth, most, return_ratios=True)
+    middle = np.exp(-2j * np.pi * frequency * range_m / SPEED_OF_LIGHT)
+    basis = np.asarray((sequences[inside > _LEFT**2] * middle).T, np.complex128)
     return _with(echo, samples - (samples @ basis.conj()) @ basis.T)
 
 

@@ -107,6 +107,8 @@ COORDINATES: dict[str, Variable] = {
     "amplitude_threshold": Variable(
         ("amplitude_threshold",), "real", "1", "threshold of the 2-D detector, a power ratio"
     ),
+    "suppression": Variable(("suppression",), "label", "", "suppression of the coupling"),
+    "weighting": Variable(("weighting",), "label", "", "weighting of the frequencies"),
     "realization": Variable(("realization",), "integer", "1", "number of the realization"),
 }
 
@@ -416,6 +418,35 @@ PRODUCTS: dict[str, dict[str, Variable]] = {
             ("ground_axis", "y", "x"), "real", "m", "resolution on the ground over the scene"
         ),
         "map_height": Variable((), "real", "m", "target height of the maps"),
+    },
+    "coupling": {
+        "scene_power": Variable(
+            ("slant_range",),
+            "real",
+            "1",
+            "mean power of the range profiles without coupling",
+            "over the mean of the image's slant ranges, of all positions and channels",
+        ),
+        "power": Variable(
+            ("weighting", "suppression", "slant_range"),
+            "real",
+            "1",
+            "mean power of the range profiles as received",
+            "over the mean of the image's slant ranges without coupling",
+        ),
+        "point_image": Variable(
+            ("suppression", "channel", "y", "x"),
+            "complex",
+            "1",
+            "image of a unit point target at its place after suppression",
+            "amplitude 1 and phase 0 without any",
+        ),
+        "common_share": Variable(
+            ("channel", "y", "x"),
+            "real",
+            "1",
+            "share of a target's amplitude that is common to all positions",
+        ),
     },
     "baseline_angle": {
         "length_drawn": Variable(

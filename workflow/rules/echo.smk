@@ -36,3 +36,22 @@ rule received:
         configuration=stage_configuration("received"),
     script:
         "../scripts/stage.py"
+
+
+rule coupling:
+    input:
+        trajectory="<results>/trajectory.nc",
+        echo="<results>/echo.nc",
+        received="<results>/received.nc",
+        code=stage_sources("coupling"),
+    output:
+        "<results>/coupling.nc",
+    log:
+        "<logs>/coupling.log",
+    benchmark:
+        "<benchmarks>/coupling.tsv"
+    threads: workflow.cores
+    params:
+        configuration=stage_configuration("coupling"),
+    script:
+        "../scripts/stage.py"

@@ -16,6 +16,7 @@ from vinsar.figures import (
     baselines,
     captions,
     chain,
+    coupling,
     height_error,
     moving,
     noise,
@@ -159,6 +160,7 @@ FIGURES: dict[str, Figure] = {
     "roc": Figure(
         obstacles.draw_roc, (), ("figures", "scene", "detection", "sweeps"), (obstacles.SWEEP,)
     ),
+    "coupling": Figure(coupling.draw, ("coupling",), ("figures",), ("coupling",)),
     "design": Figure(prediction.draw_sheet, (), ("figures", *design.SECTIONS)),
     "design_check": Figure(
         prediction.draw_check,

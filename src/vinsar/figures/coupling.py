@@ -1,0 +1,148 @@
+"""The coupling of transmitter and receiver, its suppression, and what that costs a target."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar import variables
+from vinsar.figures import style, sweeps
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from vinsar import config
+    from vinsar.pipeline import Products
+
+    Floats = NDArray[np.floating]
+
+_DASHED, _DOTTED, _BROKEN = (0, (4, 1.5)), (0, (1, 1.2)), (0, (4, 1.2, 1, 1.2))
+_PURPLE = "#7b3294"
+_LOOKS = {
+    ("rectangular", "none"): sweeps.Look("as received", style.ORANGE, "-", "o"),
+    ("hann", "none"): sweeps.Look("Hann window", style.BLUE, _DASHED, "s"),
+    ("rectangular", "common"): sweeps.Look("common part removed", style.INK, _BROKEN, "^"),
+    ("rectangular", "gate"): sweeps.Look("gate", _PURPLE, _DOTTED, "v"),
+}
+_LEAST_DB = -60.0
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw the coupling and its suppression.
+
+    Parameters
+    ----------
+    products
+        ``coupling`` and ``sweeps/coupling``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    del study
+    data = products["coupling"]
+    figure = style.new_figure(style.TWO_COLUMNS_MM, 137.0)
+    _profiles(style.place(figure, 13.0, 84.0, 163.0, 46.0), data)
+    _levels(style.place(figure, 13.0, 12.0, 71.0, 54.0), products["sweeps/coupling"])
+    _cost(style.place(figure, 105.0, 12.0, 71.0, 54.0), data)
+    return figure
+
+
+def _decibel(power: Floats, width: int) -> Floats:
+    """Return a power in dB, averaged over some samples: lobes are not to fill the panel."""
+    mean = np.convolve(power, np.full(width, 1 / width), mode="same")
+    return 10 * np.log10(np.maximum(mean, 10 ** (_LEAST_DB / 10 - 2)))
+
+
+def _profiles(axes: Axes, data: xr.Dataset) -> None:
+    range_ = data["slant_range"].values
+    width = max(1, round(0.2 / (range_[1] - range_[0])))
+    curves = [
+        (data["power"].sel(weighting=weighting, suppression=method), look)
+        for (weighting, method), look in _LOOKS.items()
+    ]
+    highest = 0.0
+    for power, look in curves:
+        level = _decibel(power.values, width)
+        highest = max(highest, float(level.max()))
+        axes.plot(range_, level, color=look.colour, linestyle=look.line, label=look.label)
+    axes.plot(
+        range_,
+        _decibel(data["scene_power"].values, width),
+        color=style.GREY,
+        linewidth=2.2,
+        alpha=0.55,
+        zorder=0.5,
+        label="without coupling",
+    )
+    axes.set_xlim(0, range_[-1])
+    axes.set_ylim(_LEAST_DB, highest + 20)
+    axes.set_xlabel("slant range (m)")
+    axes.set_ylabel("power over the scene's (dB)")
+    axes.set_title("(a) range profiles, mean over positions")
+    axes.legend(loc="upper right", ncols=3)
+
+
+def _levels(axes: Axes, sweep: xr.Dataset) -> None:
+    keys = ("imaging_range_window", "suppression_method", "echo_coupling_db")
+    part = variables.swept(sweep, *keys).sortby("echo_coupling_db")
+    levels = part["echo_coupling_db"].values
+    values = []
+    for (weighting, method), look in _LOOKS.items():
+        if weighting in part["imaging_range_window"] and method in part["suppression_method"]:
+            case = part.sel(imaging_range_window=weighting, suppression_method=method)
+            std = 100 * case["std"].sel(region="visible_ground")
+            sweeps.curve(axes, levels, std, look)
+            values.append(std.values)
+    limits = sweeps.around(*values, high=4.0)
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    sweeps.log_axis(axes.yaxis, limits)
+    axes.xaxis.set_major_locator(style.round_ticks(8))
+    axes.set_xlabel("coupling over the scene's mean power in a cell (dB)")
+    axes.set_ylabel("height std, visible ground (cm)")
+    axes.set_title("(b) height error by the level of the coupling")
+    axes.legend(loc="upper left", ncols=2)
+
+
+def _cost(axes: Axes, data: xr.Dataset) -> None:
+    x, share = data["x"].values, data["common_share"].isel(channel=0)
+    image = abs(data["point_image"].isel(channel=0))
+    for row, (colour, line, marker) in enumerate(
+        ((style.BLUE, "-", "o"), (style.ORANGE, _DASHED, "s"))
+    ):
+        y = float(data["y"][row])
+        axes.plot(x, 1 - share.isel(y=row), color=colour, linestyle=line)
+        axes.plot(
+            x,
+            image.sel(suppression="common").isel(y=row),
+            color=colour,
+            linestyle=line,
+            marker=marker,
+            markersize=3,
+            markerfacecolor="white",
+            markeredgewidth=0.8,
+            label=f"common part removed, y = {y:g} m",
+        )
+    axes.plot(
+        x,
+        image.sel(suppression="gate").mean("y"),
+        color=_PURPLE,
+        linestyle=_DOTTED,
+        label="gate",
+    )
+    axes.set_xlim(0, x[-1])
+    axes.set_ylim(0, 1.12)
+    axes.yaxis.set_major_locator(style.round_ticks(6))
+    axes.set_xlabel("x of the target (m)")
+    axes.set_ylabel("amplitude left (1)")
+    axes.set_title("(c) what a point target keeps")
+    axes.legend(loc="lower right")
