@@ -143,6 +143,14 @@ class Sheet:
         return int(2 * self.antennas.sizes["position"] * self.frequency.size)
 
     @property
+    def scan_duration(self) -> float:
+        """Duration of a scan, s: the cart's on a rail, the dwell on all samples of an array."""
+        part = self.study.radar
+        if part.system == "rail":
+            return self.study.vehicle.scan_duration_s
+        return self.samples * part.dwell_s
+
+    @property
     def x(self) -> float:
         """Middle of the image along x, m."""
         return (self.study.imaging.x_min_m + self.study.imaging.x_max_m) / 2
@@ -559,7 +567,7 @@ def as_markdown(sheet: Sheet) -> str:
         Tables of what is predicted, and the warnings.
     """
     study, y = sheet.study, sheet.places
-    part, vehicle = study.radar, study.vehicle
+    part = study.radar
     megabytes = sheet.samples * _BYTES_PER_SAMPLE / 1e6
     lines = [
         f"# Design of the study {study.study}",
@@ -572,9 +580,9 @@ def as_markdown(sheet: Sheet) -> str:
         f"{1e2 * sheet.range_resolution:.2f} cm",
         f"- unambiguous range {sheet.unambiguous_range:.2f} m; the farthest target is at "
         f"{sheet.farthest_range:.2f} m",
-        f"- {sheet.samples} complex samples a scan of {vehicle.scan_duration_s:g} s, "
+        f"- {sheet.samples} complex samples a scan of {sheet.scan_duration:.3g} s, "
         f"{megabytes:.2f} MB in single precision; the vehicle drives "
-        f"{vehicle.forward_speed_m_per_s * vehicle.scan_duration_s:.2f} m in it",
+        f"{study.vehicle.forward_speed_m_per_s * sheet.scan_duration:.2f} m in it",
         "",
         f"At x = {sheet.x:g} m, for relief and obstacles of {study.scene.peak_height_m:g} m:",
         "",
@@ -619,8 +627,10 @@ def as_markdown(sheet: Sheet) -> str:
         )
     lines += [
         "",
-        "Position errors drawn anew at each position and for each antenna, 1 sigma, with which 95 "
-        f"% of the heights stay within {most:g} cm:",
+        "Position errors drawn anew at each position and for each channel, 1 sigma, with which 95 "
+        f"% of the heights stay within {most:g} cm (errors that both channels share, as on a "
+        "shaking vehicle or of common receivers, do no more harm than that, and none over level "
+        "ground):",
         "",
         "| along | tolerated (mm) | wavelengths |",
         "|---|---:|---:|",

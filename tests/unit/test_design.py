@@ -12,19 +12,18 @@ from vinsar import aperture, baseline, config, design, geometry, radar, trajecto
 
 CONFIG = Path(__file__).parents[2] / "config"
 WAVELENGTH = 299_792_458.0 / 14e9
+ENDS = ("transmitter", "receiver")
 PAPER = validation.load(CONFIG / "paper.yaml")
 
 
 def study_with(**sections: dict[str, Any]) -> config.Study:
     raw = PAPER.model_dump(mode="json") | {"sweeps": {}, "variants": {}}
+    raw["outputs"] = {"figures": [], "claims": False}
     return validation.check(validation.merge(raw, sections))
 
 
-def sheet_of(antennas=None, **sections) -> design.Sheet:
-    made = design.Sheet(study_with(**sections))
-    if antennas is not None:
-        made.__dict__["antennas"] = antennas
-    return made
+def sheet_of(**sections: dict[str, Any]) -> design.Sheet:
+    return design.Sheet(study_with(**sections))
 
 
 def exact_height_error(true, told, x, y):
@@ -33,16 +32,6 @@ def exact_height_error(true, told, x, y):
     phase = aperture.interferometric_phase(lower, upper, x, y, 0.0, WAVELENGTH)
     *_, height = aperture.locate(lower, trajectory.apertures(told)[1], x, y, phase, WAVELENGTH)
     return float(height)
-
-
-def array(rail):
-    """Transmitters at two heights and one row of receivers."""
-    receivers = rail.isel(channel=[0, 0])["receiver"].values + np.array([0.0, 0.1, 0.2])
-    transmitters = rail["transmitter"].values * [0.0, 1.0, 1.0]
-    return rail.assign(
-        receiver=rail["receiver"].copy(data=receivers),
-        transmitter=rail["transmitter"].copy(data=transmitters),
-    )
 
 
 @pytest.mark.parametrize("angle", [30.0, 60.0, 90.0, 120.0])
@@ -65,40 +54,46 @@ def test_of_a_rail_length_and_attitude_of_the_baseline_are_eqs_5_and_12_with_the
     sheet = sheet_of(radar={"baseline_angle_deg": angle})
     length, attitude, *_ = sheet.offsets()
     for number, y in enumerate(sheet.places):
-        seen = baseline.View(2.0, 0.0, float(y), WAVELENGTH, 0.075, np.deg2rad(angle))
+        seen = baseline.View(
+            np.array([0.0, 0.0, 2.0]), 0.0, float(y), WAVELENGTH, 0.075, np.deg2rad(angle)
+        )
         expected = baseline.height_per_length(seen, 0.3, np.deg2rad(angle))
         assert length.per_unit[number] / 1e-3 == pytest.approx(float(expected), rel=1e-6)
         eq12 = geometry.height_per_baseline_angle(seen.slant_range, seen.look)
         assert attitude.per_unit[number] == pytest.approx(np.deg2rad(float(eq12)), rel=1e-6)
 
 
-@pytest.mark.parametrize("arrangement", ["rail", "array"])
+@pytest.mark.parametrize("system", ["rail", "transmit_pair", "receive_pair"])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize(("x", "y"), [(0.0, 13.0), (1.5, 10.0)])
-def test_an_offset_moves_the_height_as_the_exact_inversion_does(rail, arrangement, axis, x, y):
-    true = rail if arrangement == "rail" else array(rail)
-    step = 1e-4 * np.eye(3)[axis]
-    end = "transmitter"
-    moved = {end: true[end].copy(data=true[end].values + np.array([0, 1])[:, None, None] * step)}
-    if arrangement == "rail":
-        moved["receiver"] = moved[end]
-    sheet = sheet_of(true)
+def test_an_offset_moves_the_height_as_the_exact_inversion_does(system, axis, x, y):
+    sheet = sheet_of(radar={"system": system})
+    true = sheet.antennas
+    ends = {"rail": ENDS, "transmit_pair": ENDS[:1], "receive_pair": ENDS[1:]}[system]
+    step = np.array([0, 1])[:, None, None] * 1e-4 * np.eye(3)[axis]
+    moved = {end: true[end].copy(data=true[end].values + step) for end in ends}
     found = float(sheet.height_per_offset(x, y, np.eye(3)[axis]))
     # Second order of a tenth of a millimetre: 1e-4 / B of the height error itself.
     expected = exact_height_error(true, true.assign(moved), x, y) / 1e-4
     assert found == pytest.approx(expected, rel=2e-3, abs=1e-3)
 
 
-def test_a_pair_of_transmitters_has_twice_the_height_of_ambiguity_and_resolution_of_the_rail(rail):
-    # Exactly so with the receivers where the lower transmitter is, and to a few per cent elsewhere.
-    one, other = sheet_of(rail), sheet_of(array(rail))
-    y = one.places
+@pytest.mark.parametrize("system", ["transmit_pair", "receive_pair"])
+def test_a_switched_array_has_twice_the_rail_s_height_of_ambiguity_and_cell(system):
+    rail, array = sheet_of(), sheet_of(radar={"system": system})
+    y = rail.places
+    # The ends of an array's paths stand at other heights than the rail's: a few per cent.
     np.testing.assert_allclose(
-        other.height_of_ambiguity(y), 2 * one.height_of_ambiguity(y), rtol=0.06
+        array.height_of_ambiguity(y), 2 * rail.height_of_ambiguity(y), rtol=0.06
     )
-    np.testing.assert_allclose(other.resolution(y)[0], 2 * one.resolution(y)[0], rtol=0.02)
-    width = [one.unambiguous_width(13.0), other.unambiguous_width(13.0)]
-    assert width[1] > 1.9 * width[0]
+    np.testing.assert_allclose(array.resolution(y)[0], 2 * rail.resolution(y)[0], rtol=0.02)
+    assert array.unambiguous_width(13.0) > 1.9 * rail.unambiguous_width(13.0)
+
+
+def test_an_array_dwells_on_each_sample():
+    sheet = sheet_of(radar={"system": "receive_pair", "dwell_s": 1e-6})
+    assert sheet.scan_duration == pytest.approx(2 * 81 * 401 * 1e-6)
+    assert sheet_of().scan_duration == PAPER.vehicle.scan_duration_s
 
 
 def test_a_short_baseline_has_the_critical_baseline_of_the_paper():
