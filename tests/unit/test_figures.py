@@ -51,14 +51,14 @@ NAMES = [
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
     *("baseline_length", "baseline_angle", "baseline_vibration", "snr", "moving"),
     *("obstacles", "roc"),
-    *("design", "design_check"),
+    *("coupling", "design", "design_check"),
 ]
 NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr", "design_check"}
 # The front sheet is a slide, whatever the journal's columns and text are.
 SLIDES = {"summary": 338.7}
 FORMATS = ["pdf", "svg", "png"]
 SMALL: dict[str, dict[str, Any]] = {
-    "radar": {"frequency_count": 101, "position_spacing_m": 0.02},
+    "radar": {"frequency_count": 201, "position_spacing_m": 0.02},
     "scene": {
         "x_min_m": -0.8,
         "x_max_m": 0.8,
@@ -164,10 +164,16 @@ def make_found(roughness: list[float], realizations: int = 4) -> xr.Dataset:
     return variables.sweep_dataset(data, swept, coords)
 
 
+def other_sweeps() -> dict[str, config.Sweep]:
+    """Return the sweeps of the studies beside the paper's that figures show."""
+    raw = yaml.safe_load((PAPER.parent / "coupling.yaml").read_text(encoding="utf-8"))
+    return {name: config.Sweep.model_validate(sweep) for name, sweep in raw["sweeps"].items()}
+
+
 def all_sweeps(study: config.Study) -> pipeline.Products:
-    """Make the sweeps that the paper's configuration describes, with made up heights."""
+    """Make the sweeps that the studies with figures describe, with made up heights."""
     made = {}
-    for name, sweep in study.sweeps.items():
+    for name, sweep in (study.sweeps | other_sweeps()).items():
         over = {key: list(values) for key, values in sweep.over.items()}
         shape = tuple(len(values) for values in over.values())
         # From 1 cm to half a metre along the last key, another size along the others.
@@ -256,7 +262,7 @@ def test_registry_is_complete_and_declares_known_inputs(study: config.Study) -> 
     assert list(figures.FIGURES) == NAMES
     for figure in figures.FIGURES.values():
         assert set(figure.inputs) <= set(pipeline.STAGES)
-        assert set(figure.sweeps) <= set(study.sweeps)
+        assert set(figure.sweeps) <= {*study.sweeps, *other_sweeps()}
         assert set(figure.sections) <= set(config.Study.model_fields)
         assert "figures" in figure.sections
 

@@ -58,7 +58,9 @@ def draw(products: Products, study: config.Study) -> Figure:
 
 def _decibel(power: Floats, width: int) -> Floats:
     """Return a power in dB, averaged over some samples: lobes are not to fill the panel."""
-    mean = np.convolve(power, np.full(width, 1 / width), mode="same")
+    from scipy.ndimage import uniform_filter1d
+
+    mean = uniform_filter1d(power, width, mode="nearest")
     return 10 * np.log10(np.maximum(mean, 10 ** (_LEAST_DB / 10 - 2)))
 
 
