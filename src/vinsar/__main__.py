@@ -1,4 +1,4 @@
-"""The design sheet, and the commands on results: `trace`, `verify`, `diff`, `reproduce`, `crate`."""
+"""The commands beside Snakemake: the design sheet, and what asks, repeats and packs results."""
 
 from __future__ import annotations
 

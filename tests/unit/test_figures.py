@@ -93,7 +93,7 @@ SMALL: dict[str, dict[str, Any]] = {
 
 def make_study(**sections: dict[str, Any]) -> config.Study:
     values = yaml.safe_load(PAPER.read_text(encoding="utf-8"))
-    for other in ("moving", "obstacles"):
+    for other in ("moving", "obstacles", "coupling"):
         text = PAPER.with_name(f"{other}.yaml").read_text(encoding="utf-8")
         values["sweeps"] |= yaml.safe_load(text)["sweeps"]
     for name, section in sections.items():
@@ -164,16 +164,10 @@ def make_found(roughness: list[float], realizations: int = 4) -> xr.Dataset:
     return variables.sweep_dataset(data, swept, coords)
 
 
-def other_sweeps() -> dict[str, config.Sweep]:
-    """Return the sweeps of the studies beside the paper's that figures show."""
-    raw = yaml.safe_load((PAPER.parent / "coupling.yaml").read_text(encoding="utf-8"))
-    return {name: config.Sweep.model_validate(sweep) for name, sweep in raw["sweeps"].items()}
-
-
 def all_sweeps(study: config.Study) -> pipeline.Products:
-    """Make the sweeps that the studies with figures describe, with made up heights."""
+    """Make the sweeps that the configuration describes, with made up heights."""
     made = {}
-    for name, sweep in (study.sweeps | other_sweeps()).items():
+    for name, sweep in study.sweeps.items():
         over = {key: list(values) for key, values in sweep.over.items()}
         shape = tuple(len(values) for values in over.values())
         # From 1 cm to half a metre along the last key, another size along the others.
@@ -262,7 +256,7 @@ def test_registry_is_complete_and_declares_known_inputs(study: config.Study) -> 
     assert list(figures.FIGURES) == NAMES
     for figure in figures.FIGURES.values():
         assert set(figure.inputs) <= set(pipeline.STAGES)
-        assert set(figure.sweeps) <= {*study.sweeps, *other_sweeps()}
+        assert set(figure.sweeps) <= set(study.sweeps)
         assert set(figure.sections) <= set(config.Study.model_fields)
         assert "figures" in figure.sections
 
