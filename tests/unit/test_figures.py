@@ -28,6 +28,7 @@ from vinsar import (
     geometry,
     motion,
     pipeline,
+    systems,
     validation,
     variables,
 )
@@ -45,13 +46,13 @@ from vinsar.figures import (
 )
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
-OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr", "moving"]
+OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr", "moving", "systems"]
 NAMES = [
     "summary",
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
     *("baseline_length", "baseline_angle", "baseline_vibration", "snr", "moving"),
     *("obstacles", "roc"),
-    *("coupling", "design", "design_check"),
+    *("coupling", "design", "design_check", "systems"),
 ]
 NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr", "design_check"}
 # The front sheet is a slide, whatever the journal's columns and text are.
@@ -93,7 +94,7 @@ SMALL: dict[str, dict[str, Any]] = {
 
 def make_study(**sections: dict[str, Any]) -> config.Study:
     values = yaml.safe_load(PAPER.read_text(encoding="utf-8"))
-    for other in ("moving", "obstacles", "coupling"):
+    for other in ("array", "moving", "obstacles", "coupling"):
         text = PAPER.with_name(f"{other}.yaml").read_text(encoding="utf-8")
         values["sweeps"] |= yaml.safe_load(text)["sweeps"]
     for name, section in sections.items():
@@ -127,7 +128,10 @@ def make_sweep(
             one = one[..., None] * np.asarray(trailing[dim])
         data[name] = one.astype(int) if name == "residues" else one
     swept = {
-        key.replace(".", "_"): (np.asarray(values), {"long_name": key})
+        key.replace(".", "_"): (
+            np.asarray([json.dumps(v) if isinstance(v, dict) else v for v in values]),
+            {"long_name": key},
+        )
         for key, values in over.items()
     }
     return variables.sweep_dataset(data, swept)
@@ -318,6 +322,8 @@ def test_figure_has_the_width_and_the_text_asked_for_and_stays_readable(
         ({"baseline_angle_deg": 45.0, "rail_height_m": 1.6}, 12.0),
         ({"baseline_angle_deg": 0.0, "baseline_m": 1.0}, 16.0),
         ({"baseline_angle_deg": 120.0, "rail_height_m": 0.9, "baseline_m": 0.1}, 16.0),
+        ({"system": "transmit_pair", "aperture_length_m": 1.6}, 16.0),
+        ({"system": "receive_pair", "transmitter_x_m": 0.9, "transmitter_y_m": -0.4}, 16.0),
     ],
 )
 def test_geometry_is_readable_for_other_radars(
@@ -355,6 +361,59 @@ def test_geometry_is_to_scale_with_the_study_s_values(monkeypatch: pytest.Monkey
     ambiguity = 0.0214137 * r1 * np.sin(look) / (2 * 0.3 * np.cos(np.pi / 3 - look))
     assert listed["height of ambiguity"] == f"{ambiguity:.3f} m"
     assert set(listed.values()) - {""} <= set(texts)
+
+
+@pytest.mark.parametrize(
+    ("system", "names"),
+    [("transmit_pair", {"Tx$_1$", "Tx$_2$", "Rx"}), ("receive_pair", {"Rx$_1$", "Rx$_2$", "Tx"})],
+)
+def test_geometry_of_an_array_shows_its_transmitters_and_receivers(
+    system: str, names: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = make_study(radar={"system": system, "transmitter_x_m": 0.6, "transmitter_y_m": 0.1})
+    figure = draw("fig1", {}, study)
+    assert names <= set(written(figure, monkeypatch))
+    transmitter = (0.6, 0.1, 2.1)
+    lower = np.array(transmitter if system == "transmit_pair" else (0.0, 0.0, 2.0))
+    listed = dict(acquisition.values(study))
+    r1 = float(geometry.slant_range(lower, 0.0, 13.0, 0.3))
+    assert f"$r_1$ = {r1:.3f} m" in written(figure, monkeypatch)
+    # Twice those of a rail: lambda r1 sin(theta) / B_perp, which is lambda r1 / B, and lambda r1/L.
+    assert listed["height of ambiguity"] == f"{0.0214137 * r1 / 0.3:.3f} m"
+    assert listed["resolution in x"] == f"{100 * 0.0214137 * r1 / 0.8:.1f} cm"
+    # In the plan the transmitter stands where it is.
+    plan = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("(c)"))
+    spots = [line.get_xydata()[0] for line in plan.lines if len(line.get_xydata()) == 1]
+    assert any(np.allclose(spot, transmitter[:2]) for spot in spots)
+
+
+def test_systems_show_what_each_arrangement_achieves(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    figure = draw("systems", products, study)
+    found = systems.compare(products["sweeps/systems"], study)
+    across, cycle, error, time = figure.axes
+    for axes, values in (
+        (across, [100 * one.resolution_m[0] for one in found]),
+        (cycle, [one.height_of_ambiguity_m for one in found]),
+        (time, [1000 * one.scan_time_s for one in found]),
+    ):
+        ends = [bar.get_x() + bar.get_width() for bar in axes.patches]
+        assert ends == pytest.approx(values)
+    shown = [line for line in error.lines if line.get_marker() == "o"]
+    means = [100 * float(one.accuracy["std"].sel(region="visible_ground").mean()) for one in found]
+    assert [line.get_xdata()[0] for line in shown] == pytest.approx(means)
+    names = [text.get_text() for text in across.get_yticklabels()]
+    assert names[:2] == ["rail, 0.8 m", "transmit pair, 0.8 m"]
+
+
+def test_the_curve_of_an_array_is_an_ellipse(
+    products: pipeline.Products, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = make_study(radar={"system": "transmit_pair"})
+    texts = written(draw("fig2", products, study), monkeypatch)
+    assert "ellipse" in texts
+    assert not any("circle" in text for text in texts)
 
 
 def test_geometry_shows_the_image_where_it_is_not_the_scene(

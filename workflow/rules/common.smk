@@ -5,7 +5,7 @@ from functools import cache
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
-from vinsar import claims, figures, pipeline, provenance, sweep, validation
+from vinsar import claims, figures, pipeline, provenance, sweep, systems, validation
 from vinsar import report as study_report
 
 try:

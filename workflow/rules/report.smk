@@ -92,3 +92,23 @@ rule design:
         configuration=STUDY.model_dump(mode="json"),
     script:
         "../scripts/design.py"
+
+
+rule systems:
+    input:
+        **sweep_files(systems.SWEEP),
+        code=sources_of("systems", script="systems"),
+    output:
+        report(
+            "<results>/systems.md",
+            caption="../report/systems.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/systems.log",
+    benchmark:
+        "<benchmarks>/systems.tsv"
+    params:
+        configuration=configuration("radar", "scene", "vehicle", "sweeps"),
+    script:
+        "../scripts/systems.py"

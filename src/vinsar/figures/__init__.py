@@ -24,6 +24,7 @@ from vinsar.figures import (
     prediction,
     registration_error,
     summary,
+    systems,
     vibration,
 )
 from vinsar.figures.files import save
@@ -87,7 +88,7 @@ FIGURES: dict[str, Figure] = {
     "fig2": Figure(
         registration_error.draw,
         ("registration",),
-        ("figures",),
+        ("figures", "radar"),
         title="Registration error",
         numbers=captions.registration_error,
     ),
@@ -167,6 +168,9 @@ FIGURES: dict[str, Figure] = {
         (),
         ("figures", "sweeps", *design.SECTIONS),
         ("snr", "baseline_length", "vibration"),
+    ),
+    "systems": Figure(
+        systems.draw, (), ("figures", "radar", "scene", "vehicle", "sweeps"), ("systems",)
     ),
 }
 """The figures by name: the paper's in its order, then those of its section 1.2, of noise, and of

@@ -27,18 +27,32 @@ _DIMENSION = {
     "shrinkB": 0,
     "mutation_scale": 6,
 }
+_COMMON: dict[str, Any] = {"color": style.GREY, "linestyle": (0, (5, 1.5))}
+_NAMES = {
+    "rail": ("$S_1$", "$S_2$", ""),
+    "transmit_pair": ("Tx$_1$", "Tx$_2$", "Rx"),
+    "receive_pair": ("Rx$_1$", "Rx$_2$", "Tx"),
+}
 _LEAST_ANGLE_DEG = 25
 _EDGES = ("x_min_m", "x_max_m", "y_min_m", "y_max_m")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The antennas and a target in the plane x = 0, and what follows from them.
+    """The antennas and a target seen from the side, and what follows from them.
 
     Attributes
     ----------
     lower, upper, target
         Positions (y, z) of S1, S2 and T, m.
+    baseline, beta
+        Length, m, and attitude, rad, of the baseline from S1 to S2.
+    names
+        What S1 and S2 are called, and the end of the path that both channels have in common.
+    common
+        Position (y, z) of that end, m; none on a rail.
+    aside
+        x of S1 and S2, m: the target stands at 0.
     """
 
     lower: NDArray[np.float64]
@@ -46,17 +60,22 @@ class Layout:
     target: NDArray[np.float64]
     baseline: float
     beta: float
+    names: tuple[str, str, str]
+    common: NDArray[np.float64] | None
+    aside: float
 
     @property
     def ranges(self) -> tuple[float, float]:
         """Slant ranges r1 and r2, m."""
-        lower, upper = (np.linalg.norm(self.target - s) for s in (self.lower, self.upper))
+        lower, upper = (
+            np.hypot(np.linalg.norm(self.target - s), self.aside) for s in (self.lower, self.upper)
+        )
         return float(lower), float(upper)
 
     @property
     def look(self) -> float:
         """Look angle theta of S1 from nadir, rad."""
-        return float(geometry.look_angle((0, *self.lower), 0, *self.target))
+        return float(geometry.look_angle((self.aside, *self.lower), 0, *self.target))
 
 
 def layout(study: config.Study) -> Layout:
@@ -70,18 +89,28 @@ def layout(study: config.Study) -> Layout:
     Returns
     -------
     Layout
-        Positions in the plane x = 0.
+        Positions seen from the side.
     """
-    beta = np.deg2rad(study.radar.baseline_angle_deg)
-    lower = np.array([0.0, study.radar.rail_height_m])
-    step = study.radar.baseline_m * np.array([np.cos(beta), np.sin(beta)])
+    options = study.radar
+    beta = np.deg2rad(options.baseline_angle_deg)
+    line = np.array([0.0, options.rail_height_m])
+    transmitter = np.array([options.transmitter_y_m, options.transmitter_height_m])
+    lower, common, aside = {
+        "rail": (line, None, 0.0),
+        "transmit_pair": (transmitter, line, options.transmitter_x_m),
+        "receive_pair": (line, transmitter, 0.0),
+    }[options.system]
+    step = options.baseline_m * np.array([np.cos(beta), np.sin(beta)])
     middle = (study.scene.y_min_m + study.scene.y_max_m) / 2
     return Layout(
         lower,
         lower + step,
         np.array([middle, study.scene.peak_height_m]),
-        study.radar.baseline_m,
+        options.baseline_m,
         float(beta),
+        _NAMES[options.system],
+        common,
+        aside,
     )
 
 
@@ -117,7 +146,7 @@ def draw(products: Products, study: config.Study) -> Figure:
 
 def _side_limits(scheme: Layout, study: config.Study) -> tuple[float, float, float, float]:
     far = 1.02 * max(study.scene.y_max_m, study.imaging.y_max_m)
-    near = min(-1.5 * scheme.lower[1], -0.12 * far, _zoom_limits(scheme)[0])
+    near = min(-1.5 * study.radar.rail_height_m, -0.12 * far, _zoom_limits(scheme)[0])
     # What is written beside the target takes a seventh of the width at its right.
     span = max(far - near, 7 / 6 * (scheme.target[0] - near))
     top = max(1.08 * scheme.target[1], _zoom_limits(scheme)[3])
@@ -145,9 +174,13 @@ def _side(
         va="top",
         fontsize=style.points(6.5),
     )
-    _vehicle(axes, scheme.lower[1])
+    rail = study.radar.rail_height_m
+    _vehicle(axes, rail)
     target, lower, upper = scheme.target, scheme.lower, scheme.upper
     r1, r2 = scheme.ranges
+    if scheme.common is not None:
+        axes.plot(*zip(scheme.common, target, strict=True), **_COMMON, linewidth=0.7)
+        axes.plot(*scheme.common, "s", color=style.GREY, markersize=3, zorder=5)
     for antenna, colour in ((lower, style.BLUE), (upper, style.ORANGE)):
         axes.plot(*zip(antenna, target, strict=True), color=colour, linewidth=0.8)
         axes.plot(*antenna, "o", color=colour, markersize=3, zorder=5)
@@ -168,11 +201,11 @@ def _side(
             rotation=float(np.degrees(np.arctan2(step[1], step[0]))),
             rotation_mode="anchor",
         )
-    axes.annotate("", (0, 0), tuple(lower), arrowprops=_DIMENSION)
+    axes.annotate("", (0, 0), (0, rail), arrowprops=_DIMENSION)
     axes.text(
         -unit,
-        0.42 * lower[1],
-        f"$H_0$ = {lower[1]:g} m",
+        0.42 * rail,
+        f"$H_0$ = {rail:g} m",
         ha="right",
         va="center",
         fontsize=style.points(7),
@@ -207,7 +240,8 @@ def _side(
     axes.set_ylabel("z (m)")
     axes.xaxis.set_major_locator(style.round_ticks(11))
     axes.yaxis.set_major_locator(style.round_ticks(4))
-    axes.set_title("(a) side view in the plane x = 0, to scale (vehicle schematic)")
+    plane = "in the plane x = 0, to scale" if scheme.aside == 0 else "to scale"
+    axes.set_title(f"(a) side view {plane} (vehicle schematic)")
 
 
 def _vehicle(axes: Axes, height: float) -> None:
@@ -228,8 +262,11 @@ def _vehicle(axes: Axes, height: float) -> None:
 
 def _zoom_limits(scheme: Layout) -> tuple[float, float, float, float]:
     """Return the window around the antennas: a few baselines wide, more of it ahead."""
-    middle = (scheme.lower + scheme.upper) / 2
-    half = 1.05 * scheme.baseline
+    middle, half = (scheme.lower + scheme.upper) / 2, 1.05 * scheme.baseline
+    if scheme.common is not None:
+        places = np.stack([scheme.lower, scheme.upper, scheme.common])
+        least, most = places.min(axis=0), places.max(axis=0)
+        middle, half = (least + most) / 2, 1.05 * max(scheme.baseline, float(np.max(most - least)))
     return (
         middle[0] - 0.75 * half,
         middle[0] + 1.25 * half,
@@ -257,19 +294,32 @@ def _near_antennas(axes: Axes, scheme: Layout) -> None:
     ):
         axes.plot(*zip(antenna, scheme.target, strict=True), color=colour)
         axes.plot(*antenna, "o", color=colour, markersize=5, zorder=5)
-        at_y = view[1] - 0.18 * size
+        # Below the ray of the lower one there may be that of the common end.
+        above = side if scheme.common is None else 1
+        at_y = view[1] - 0.18 / 2.1 * (view[1] - view[0])
         step = scheme.target - antenna
         at_z = antenna[1] + (at_y - antenna[0]) * step[1] / step[0]
         axes.annotate(
             f"${symbol}$ to T",
             (at_y, at_z),
-            (0, 3 * side),
+            (0, 3 * above),
             textcoords="offset points",
             color=colour,
             ha="center",
-            va="bottom" if side > 0 else "top",
+            va="bottom" if above > 0 else "top",
         )
-    for antenna, name, offset in ((lower, "$S_1$", (-6, -3)), (upper, "$S_2$", (0, 5))):
+    if scheme.common is not None:
+        axes.plot(*zip(scheme.common, scheme.target, strict=True), **_COMMON)
+        axes.plot(*scheme.common, "s", color=style.GREY, markersize=5, zorder=5)
+        axes.annotate(
+            scheme.names[2],
+            tuple(scheme.common),
+            (-6, -3),
+            textcoords="offset points",
+            ha="right",
+        )
+    first, second, _ = scheme.names
+    for antenna, name, offset in ((lower, first, (-6, -3)), (upper, second, (0, 5))):
         axes.annotate(
             name,
             tuple(antenna),
@@ -333,6 +383,21 @@ def values(study: config.Study) -> list[tuple[str, str]]:
     )
     positions = round(options.aperture_length_m / options.position_spacing_m) + 1
     azimuth = radar.azimuth_resolution(wavelength, r1, options.aperture_length_m)
+    if options.system == "rail":
+        antennas = [
+            ("aperture $L$", f"{options.aperture_length_m:g} m"),
+            ("positions", f"{positions}"),
+            ("rail height $H_0$", f"{options.rail_height_m:g} m"),
+        ]
+    else:
+        # One end of the path stands still: half the phase, and half the aperture's angle.
+        ambiguity, azimuth = 2 * ambiguity, 2 * azimuth
+        antennas = [
+            ("array $L$", f"{options.aperture_length_m:g} m"),
+            ("elements", f"{positions}"),
+            ("array height $H_0$", f"{options.rail_height_m:g} m"),
+            ("transmitter height", f"{options.transmitter_height_m:g} m"),
+        ]
     return [
         (
             "frequency",
@@ -340,9 +405,7 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         ),
         (r"wavelength $\lambda$", f"{1000 * wavelength:.1f} mm"),
         ("slant-range resolution", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
-        ("aperture $L$", f"{options.aperture_length_m:g} m"),
-        ("positions", f"{positions}"),
-        ("rail height $H_0$", f"{options.rail_height_m:g} m"),
+        *antennas,
         ("baseline $B$", f"{scheme.baseline:g} m"),
         (r"baseline angle $\beta$", f"{options.baseline_angle_deg:g}°"),
         ("", ""),
@@ -404,12 +467,30 @@ def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None
     )
     axes.add_patch(_area(image, fill=False, edgecolor=style.INK, linewidth=0.7))
     end = study.radar.aperture_length_m / 2
+    rail_colour, place = style.BLUE, None
+    if study.radar.system != "rail":
+        place = (study.radar.transmitter_x_m, study.radar.transmitter_y_m)
+    if study.radar.system == "transmit_pair":
+        rail_colour = style.GREY
     for x in (-end, end):
-        axes.plot([x, 0], [0, scheme.target[0]], color=style.BLUE, linewidth=0.5)
-    axes.plot([-end, end], [0, 0], color=style.BLUE, linewidth=2.2, solid_capstyle="butt")
+        axes.plot([x, 0], [0, scheme.target[0]], color=rail_colour, linewidth=0.5)
+    axes.plot([-end, end], [0, 0], color=rail_colour, linewidth=2.2, solid_capstyle="butt")
+    if place is not None:
+        marker, colour = ("o", style.BLUE) if rail_colour == style.GREY else ("s", style.GREY)
+        axes.plot([place[0], 0], [place[1], scheme.target[0]], color=colour, linewidth=0.5)
+        axes.plot(*place, marker, color=colour, markersize=4, zorder=5)
+        axes.annotate("Tx", place, (0, -4), textcoords="offset points", ha="center", va="top")
     axes.plot(0, scheme.target[0], "^", color=style.INK, markersize=5, zorder=5)
     axes.annotate("T", (0, scheme.target[0]), (4, 0), textcoords="offset points", va="center")
-    axes.annotate("$L$", (body[2] / 2, 0), (2, 0), textcoords="offset points", va="center")
+    side = -1 if place is not None and place[0] > 0 else 1
+    axes.annotate(
+        "$L$",
+        (side * body[2] / 2, 0),
+        (2 * side, 0),
+        textcoords="offset points",
+        va="center",
+        ha="left" if side > 0 else "right",
+    )
     axes.xaxis.set_major_locator(style.round_ticks(4))
     axes.yaxis.set_major_locator(style.round_ticks(9))
     axes.set_xlabel("x (m)")

@@ -37,7 +37,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     matplotlib.figure.Figure
         The figure.
     """
-    del study
+    curve = "circle" if study.radar.system == "rail" else "ellipse"
     registration = products["registration"]
     figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
     lefts, bottoms, width, height = (13.0, 56.5), (53.0, 16.0), 41.0, 29.5
@@ -46,7 +46,7 @@ def draw(products: Products, study: config.Study) -> Figure:
         limit = _limit(registration, ground_axis)
         for target, left in zip(registration["target"].values, lefts, strict=True):
             axes = style.place(figure, left, bottom, width, height)
-            _curves(axes, registration, ground_axis, str(target), limit)
+            _curves(axes, registration, ground_axis, str(target), limit, curve)
             axes.set_title(_title(registration, ground_axis, str(target), next(letters)))
             axes.tick_params(labelbottom=ground_axis == "y", labelleft=target == "near")
             if ground_axis == "y":
@@ -64,7 +64,7 @@ def draw(products: Products, study: config.Study) -> Figure:
         borderaxespad=0,
         columnspacing=1.4,
     )
-    _map(figure, registration)
+    _map(figure, registration, curve)
     return figure
 
 
@@ -79,7 +79,7 @@ def _limit(registration: xr.Dataset, ground_axis: str) -> float:
 
 
 def _curves(
-    axes: Axes, registration: xr.Dataset, ground_axis: str, target: str, limit: float
+    axes: Axes, registration: xr.Dataset, ground_axis: str, target: str, limit: float, curve: str
 ) -> None:
     part = registration.sel(ground_axis=ground_axis, target=target)
     height = part["target_height"].values
@@ -95,7 +95,7 @@ def _curves(
         linestyle="--",
         label="radial (Eq. 7)",
     )
-    axes.plot(height, 1000 * part["equal_path"].values, color=style.BLUE, label="circle")
+    axes.plot(height, 1000 * part["equal_path"].values, color=style.BLUE, label=curve)
     axes.plot(
         height,
         1000 * part["measured"].values,
@@ -125,11 +125,11 @@ def _title(registration: xr.Dataset, ground_axis: str, target: str, letter: str)
     return f"({letter}) in {ground_axis}, {target} ({x:g}, {y:g}) m"
 
 
-def _map(figure: Figure, registration: xr.Dataset) -> None:
-    """Draw the error by the circle over the scene, in tenths of a resolution cell."""
+def _map(figure: Figure, registration: xr.Dataset, curve: str) -> None:
+    """Draw the error by the circle or ellipse over the scene, in tenths of a resolution cell."""
     part = registration.sel(ground_axis="y")
     share = abs(part["map_equal_path"]) / (_ALLOWED_SHARE * part["map_resolution"])
-    title = f"(e) in y by the circle, height {float(registration['map_height']):g} m"
+    title = f"(e) in y by the {curve}, height {float(registration['map_height']):g} m"
     axes = maps.place(figure, share, (110, 16, 53, 66.5), title)
     # White is exactly a tenth of a cell: blue needs no registration, red does.
     reach = min(1.0, max(0.1, float(np.ceil(10 * np.nanmax(np.abs(share.values - 1))) / 10)))
