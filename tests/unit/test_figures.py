@@ -43,6 +43,7 @@ from vinsar.figures import (
     style,
     summary,
     sweeps,
+    thumbnails,
 )
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
@@ -578,6 +579,55 @@ def test_front_sheet_says_what_the_product_holds_and_large(
     np.testing.assert_allclose(images[4].get_array(), 100 * accuracy["height_error"])
     # A thirtieth of the slide's height is what a room's last row reads.
     assert min(sizes(figure, monkeypatch)) >= 0.99 * figure.get_figheight() * 72 / 35
+
+
+def test_every_stage_has_a_small_picture_or_says_what_it_makes(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    for name in pipeline.STAGES:
+        assert thumbnails.shows(name) != name.replace("_", " "), name
+        made = thumbnails.png(name, products[name], study.figures)
+        if name in {"focus", "detection_accuracy"}:
+            assert made is None
+        else:
+            assert made is not None
+            width, height = struct.unpack(">II", made[16:24])
+            assert width > 250
+            assert height > 200
+            assert made == thumbnails.png(name, products[name], study.figures)
+    assert thumbnails.png("another_stage", products["dem"], study.figures) is None
+    assert thumbnails.shows("another_stage") == "another stage"
+
+
+def test_captions_give_the_products_numbers(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    said = {
+        name: figure.numbers(products, study)
+        for name, figure in figures.FIGURES.items()
+        if figure.numbers is not None
+    }
+    for name, text in said.items():
+        assert text.endswith("."), name
+        assert "nan" not in text, name
+    whole = products["accuracy"].sel(region="whole_scene")
+    assert f"{100 * float(whole['fraction_within_tolerance']):.1f} % of" in said["fig4"]
+    assert f"{100 * float(whole['maximum_absolute']):.1f} cm" in said["fig4"]
+    near = products["registration"]["measured"].sel(ground_axis="y", target="near")
+    assert f"{1000 * float(abs(near).max()):.1f} mm in y" in said["fig2"]
+    r1 = float(geometry.slant_range((0.0, 0.0, 2.0), 0.0, 11.0, 0.2))
+    assert f"r1 = {r1:.3f} m" in said["fig1"]
+    shadow = 100 * float(products["truth"]["shadow"].mean())
+    assert f"{shadow:.1f} % of the cells are in shadow" in said["fig3"]
+    best, _, _ = baselines.best_lengths(products["sweeps/baseline_length"])
+    assert f"is that of {best:g} m" in said["baseline_length"]
+    worst = products["sweeps/vibration"]["std"].sel(
+        region="whole_scene",
+        motion_channels="independent",
+        motion_axis="z",
+        motion_level_wavelengths=4.0,
+    )
+    assert f"{100 * float(worst.mean()):.1f} cm along z." in said["fig5"]
 
 
 def test_histogram_counts_every_cell_once(products: pipeline.Products, study: config.Study) -> None:

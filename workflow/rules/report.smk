@@ -49,7 +49,7 @@ rule report:
         **sweep_files(*shown_sweeps()),
         **{
             f"figures/{name}.{suffix}": f"<results>/figures/{name}.{suffix}"
-            for name in SINGLE
+            for name in STUDY.outputs.figures
             for suffix in STUDY.figures.formats
             if suffix in ("png", "pdf")
         },

@@ -121,6 +121,12 @@ def _visible(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
     )
 
 
+def _above_ground(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    height = product["height_above_ground"]
+    low, high = _ends(height.values)
+    _map(axes, height, style.colormap(options.height_colormap), low, high)
+
+
 def _error(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
     del options
     limit = 3 * float(product["tolerance"])
@@ -141,6 +147,7 @@ def _sensitivity(axes: Axes, product: xr.Dataset, options: config.Figures) -> No
 
 THUMBNAILS: dict[str, Thumbnail] = {
     "elevation": Thumbnail("terrain from a file", _heights),
+    "roughness": Thumbnail("small relief of the ground", _heights),
     "terrain": Thumbnail("true height, as a raster", _heights),
     "facets": Thumbnail("point scatterers and their reflectivity", _facets),
     "trajectory": Thumbnail("antenna positions, x and z", _positions),
@@ -159,6 +166,8 @@ THUMBNAILS: dict[str, Thumbnail] = {
     "accuracy": Thumbnail("height error", _error),
     "focus": Thumbnail("what position errors leave of a point target"),
     "registration": Thumbnail("shift between the images by target height", _shifts),
+    "detections": Thumbnail("height above the ground found", _above_ground),
+    "detection_accuracy": Thumbnail("what is found, missed and falsely alarmed"),
     "baseline_angle": Thumbnail("height error by the baseline's attitude", _sensitivity),
 }
 """Small pictures by stage."""

@@ -155,7 +155,7 @@ class Report:
     title, subtitle
         What stands above it.
     sections
-        In order; the first, the summary, stands before the contents.
+        In order; `summary`, if there is one, stands before the contents.
     """
 
     title: str
@@ -546,7 +546,8 @@ def _sweeps(sources: Sources) -> Section | None:
     for name in shown_figures(sources):
         for sweep in FIGURES[name].sweeps:
             shown_by.setdefault(sweep, []).append(name)
-    rows, tables = [], []
+    rows: list[tuple[str, ...]] = []
+    tables: list[Block] = []
     for name, definition in sources.study.sweeps.items():
         product = sources.products.get(f"sweeps/{name}")
         if product is None:
@@ -562,7 +563,8 @@ def _sweeps(sources: Sources) -> Section | None:
              ", ".join(shown_by.get(name, [])))
         )  # fmt: skip
         if len(definition.over) == 1 and cases <= _MOST_CASES:
-            tables.append(_sweep_table(name, next(iter(definition.over)), product))
+            means = _sweep_table(name, next(iter(definition.over)), product)
+            tables += [Text(f"Means over the realizations of `{name}`:"), means]
     if not rows:
         return None
     overview = Table(
@@ -572,10 +574,7 @@ def _sweeps(sources: Sources) -> Section | None:
         (0, 1, 0, 0, 0),
         tuple(rows),
     )
-    blocks: list[Block] = [overview]
-    for table in tables:
-        blocks += [Text(f"Means over the realizations of `{table.name}`:"), table]
-    return Section("sweeps", "Sweeps", tuple(blocks))
+    return Section("sweeps", "Sweeps", (overview, *tables))
 
 
 def _sweep_table(name: str, key: str, product: Any) -> Table:
