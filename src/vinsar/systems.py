@@ -78,7 +78,7 @@ def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
         wavelength = radar.wavelength(radar.carrier(frequency))
         positions = round(radar_.aperture_length_m / radar_.position_spacing_m) + 1
         # ASSUME: An array has one receiver, which is switched from element to element; a cart
-        # measures both channels as it passes.
+        # measures both channels as it passes. A microsecond for each frequency.
         sweeps = len(CHANNELS) * positions * radar_.frequency_count
         rail = radar_.system == "rail"
         found.append(

@@ -101,8 +101,8 @@ def test_a_target_is_imaged_on_the_ground_at_its_own_path_and_slope(pair, x, y, 
         found = paths(part, np.array([image_x, image_y, 0.0]))
         expected = paths(part, np.array([x, y, z]))
         assert found[1] == pytest.approx(expected[1], abs=1e-9)
-        # From the ends the paths part by the third order: a tenth of the shift, which is below
-        # 0.3 m, times (L / r)^2 / 8 at most.
+        # Their slopes are those at the centre. The difference between the ends departs from it by
+        # the third order, (L / r)^2 / 24 of what the shift of below 0.3 m changes: 8e-4 of 2 cm.
         assert found[2] - found[0] == pytest.approx(expected[2] - expected[0], abs=5e-5)
 
 
