@@ -120,8 +120,12 @@ def _refuse_unsound(folder: Path, study: config.Study) -> None:
             f"{folder} is not as its study left it ({'; '.join(problems[:3])}{more}); "
             f"run the study again, then make its crate"
         )
-    wanted = {f"figures/{name}.pdf" for name in study.outputs.figures} | {"accuracy.json"}
-    wanted |= {"claims.json"} if study.outputs.claims else set()
+    wanted = {
+        f"figures/{name}.{suffix}"
+        for name in study.outputs.figures
+        for suffix in study.figures.formats
+    }
+    wanted |= {"accuracy.json", *(["claims.json"] if study.outputs.claims else [])}
     missing = sorted(wanted - set(found))
     if missing:
         raise ValueError(

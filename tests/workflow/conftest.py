@@ -22,17 +22,16 @@ class Checkout:
     @classmethod
     def new(cls, folder: Path) -> "Checkout":
         """Return one in which nothing has run."""
+        # With __pycache__: kernels that the tests before have compiled serve here as well.
         for name in ("src", "workflow", "config", "profiles", "docs"):
-            ignore = shutil.ignore_patterns("__pycache__")
-            shutil.copytree(ROOT / name, folder / name, ignore=ignore)
+            shutil.copytree(ROOT / name, folder / name)
         for name in (*FILES, "tests/workflow/tiny.yaml"):
             shutil.copy(ROOT / name, folder)
         return cls(folder)
 
     def copy(self, folder: Path) -> "Checkout":
         """Return a copy with its results, to be asked and to be spoilt."""
-        ignore = shutil.ignore_patterns("__pycache__", ".snakemake")
-        shutil.copytree(self.folder, folder, ignore=ignore)
+        shutil.copytree(self.folder, folder, ignore=shutil.ignore_patterns(".snakemake"))
         return Checkout(folder)
 
     def snakemake(self, *arguments: str, extra: str = "") -> subprocess.CompletedProcess[str]:

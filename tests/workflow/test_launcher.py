@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
 import pytest
 
 LAUNCHER = Path(__file__).resolve().parents[2] / "run"
@@ -189,8 +190,12 @@ def quick_python(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def checkout(tmp_path, quick_python) -> Checkout:
-    return new_checkout(tmp_path / "check out", quick_python)
+def checkout(tmp_path, quick_python) -> Iterator[Checkout]:
+    yield new_checkout(tmp_path / "check out", quick_python)
+    # A test that fails halfway leaves a set-up behind which waits for ever.
+    for process in psutil.process_iter(["cmdline"]):
+        if str(tmp_path) in " ".join(process.info["cmdline"] or ()):
+            process.kill()
 
 
 @pytest.fixture

@@ -2,13 +2,26 @@
 
 import subprocess
 
+from vinsar import pipeline
+
 CONFIG = ("--configfile", "tiny.yaml")
 
 
+# Each kind of figure is drawn twice in its unit test; here are datasets, a sweep and two figures.
+KEPT = ("accuracy", "figures/fig2", "figures/fig4", "sweeps/snr")
+
+
 def test_the_same_study_elsewhere_and_on_another_number_of_cores_is_the_same_bytes(copy):
+    kept = 0
+    for record in (copy.results / "records").rglob("*.json"):
+        name = record.relative_to(copy.results / "records").as_posix()
+        if name.startswith((*KEPT, *pipeline.STAGES)):
+            kept += 1
+        else:
+            record.unlink()
     done = copy.ask("reproduce", "results/tiny", *CONFIG, "--cores", "1")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "results are the same bytes" in done.stdout
+    assert f"{kept} of {kept} results are the same bytes" in done.stdout
     assert done.stdout.endswith("then 1): reproduced\n")
 
 
