@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 METADATA = "ro-crate-metadata.json"
 SOURCE = "source"
 CONFIGURATION = "configuration.yaml"
+_WORKFLOW = f"{SOURCE}/Snakefile"
 
 _PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": "Process Run Crate",
@@ -190,7 +191,12 @@ class _Description:
         self.ended = max(record["ended"] for record in self.records)
         self.agent = self._add("#agent", "Person", name=agent) if agent else None
         self.software = self._software()
-        self.files = {name: self._file(name) for name in _files(folder)}
+        # Folders tell of what is in them, and the workflow is an entity of its own kind.
+        self.files = {
+            name: self._file(name)
+            for name in _files(folder)
+            if name.partition("/")[0] not in _FOLDERS and name != _WORKFLOW
+        }
         self.parameters: dict[str, Any] = {}
 
     def document(self) -> dict[str, Any]:
@@ -288,16 +294,7 @@ class _Description:
 
     def _file(self, name: str) -> Any:
         path = self.folder / name
-        properties: dict[str, Any] = {
-            "name": path.name,
-            "sha256": provenance.sha256(path),
-            "contentSize": str(path.stat().st_size),
-            "encodingFormat": _FORMATS.get(path.suffix, "text/plain"),
-        }
-        if name == f"{SOURCE}/Snakefile":
-            return None
-        if name.split("/", maxsplit=1)[0] in _FOLDERS:
-            return None  # They are told of by their folders.
+        properties = {"name": path.name, **_size_and_kind(path)}
         if path.suffix == ".py" or path.name == "run":
             properties["@type"] = ["File", "SoftwareSourceCode"]
             properties["programmingLanguage"] = self.software["Python"]
@@ -365,18 +362,15 @@ class _Description:
         )
 
     def _workflow(self, tools: Mapping[str, Any], *, inputs: list[Any], outputs: list[Any]) -> Any:
-        path = self.folder / SOURCE / "Snakefile"
         return self.crate.add_workflow(
-            dest_path=f"{SOURCE}/Snakefile",
+            dest_path=_WORKFLOW,
             main=True,
             lang="snakemake",
             lang_version=metadata.version("snakemake"),
             cls=_TypedWorkflow,
             properties={
                 "name": "vinsar: forward-looking InSAR from raw echoes to heights",
-                "sha256": provenance.sha256(path),
-                "contentSize": str(path.stat().st_size),
-                "encodingFormat": "text/plain",
+                **_size_and_kind(self.folder / _WORKFLOW),
                 "version": vinsar.__version__,
                 "license": {"@id": _license()["@id"]},
                 "conformsTo": {
@@ -480,6 +474,14 @@ class _Description:
             datePublished=str(reference["year"]),
             isPartOf=volume,
         )
+
+
+def _size_and_kind(path: Path) -> dict[str, Any]:
+    return {
+        "sha256": provenance.sha256(path),
+        "contentSize": str(path.stat().st_size),
+        "encodingFormat": _FORMATS.get(path.suffix, "text/plain"),
+    }
 
 
 def _distinct(lists: Iterable[list[Any]]) -> list[Any]:

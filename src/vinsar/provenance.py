@@ -23,8 +23,10 @@ _LIBRARIES = (
 )  # fmt: skip
 
 # What a study is run by and from, in the repository.
-_RUN_BY = ("CITATION.cff", "LICENSE", "README.md", "Snakefile", "pyproject.toml", "requirements.in",
-           "requirements.lock", "run")  # fmt: skip
+_RUN_BY = (
+    "CITATION.cff", "LICENSE", "README.md", "Snakefile", "docs/errata.md", "pyproject.toml",
+    "requirements.in", "requirements.lock", "run",
+)  # fmt: skip
 _RUN_FROM = ("config", "profiles", "src", "workflow")
 
 

@@ -16,6 +16,9 @@ from vinsar import lineage, provenance
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+# Rules whose results tell how long jobs took, and so are never the same bytes.
+_TIMED = frozenset({"report"})
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -47,6 +50,8 @@ def reproduce(
 ) -> Verdict:
     """Run a study afresh in another folder and compare every result byte by byte.
 
+    Only the report, which tells how long the jobs took, is left out.
+
     The sources come from the commit that the results name; where they name none, because they were
     not made in a git repository, the files at hand are copied.
 
@@ -73,7 +78,11 @@ def reproduce(
     folder = Path(folder)
     if cores is not None and cores < 1:
         raise ValueError(f"a study runs on 1 core at least, not on {cores}")
-    records = lineage.read_records(folder)
+    records = {
+        name: record
+        for name, record in lineage.read_records(folder).items()
+        if record["rule"] not in _TIMED
+    }
     changed = [
         name
         for name, record in records.items()

@@ -36,9 +36,9 @@ def study(tmp_path, monkeypatch):
     return make
 
 
-def write_record(folder, name, commit, threads):
+def write_record(folder, name, commit, threads, suffix="nc"):
     lineage.write_record(
-        folder / f"{name}.nc",
+        folder / f"{name}.{suffix}",
         folder=folder,
         attributes={
             "vinsar_stage": name,
@@ -69,6 +69,13 @@ def test_what_differs_is_named_with_reasons_and_the_fresh_run_kept(study):
     assert verdict.differing == ["images.nc"]
     assert verdict.reasons == ["library threads: 2 and 3"]
     assert (verdict.kept / "images.nc").read_bytes() == b"imagES"
+
+
+def test_the_report_is_left_out(study):
+    folder = study()
+    (folder / "report.html").write_text("it took 3 s")
+    write_record(folder, "report", "unknown", 2, suffix="html")
+    assert reproduction.reproduce(folder, configuration=[]).compared == ["dem.nc", "images.nc"]
 
 
 def test_a_study_on_one_core_is_run_on_two(study):
