@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from vinsar import config, design, lineage, reproduction, validation
+from vinsar import config, design, ingest, lineage, reproduction, validation
 
 
 def _study(name: str, files: list[str]) -> config.Study | None:
@@ -55,7 +55,7 @@ def _diff(arguments: argparse.Namespace) -> int:
 
 
 def _design(arguments: argparse.Namespace) -> int:
-    study = validation.load("config/paper.yaml", *arguments.configfile)
+    study = ingest.load("config/paper.yaml", *arguments.configfile)
     sys.stdout.write(design.as_markdown(design.Sheet(study)))
     sys.stdout.flush()
     # The workflow keeps the sheet and draws it; --nolock, because a study may be running.

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 SECTIONS = (
     "radar",
     "scene",
+    "measurement",
     "echo",
     "suppression",
     "imaging",
@@ -133,7 +134,7 @@ class Sheet:
                 np.array([part.x_min_m, part.x_max_m]),
                 np.array([part.y_min_m, part.y_max_m]),
             )[1]
-            for part in (self.study.scene, self.study.imaging)
+            for part in (self.scene, self.study.imaging)
         ]
         return max(corners)
 
@@ -149,6 +150,21 @@ class Sheet:
         if part.system == "rail":
             return self.study.vehicle.scan_duration_s
         return self.samples * part.dwell_s
+
+    @property
+    def scene(self) -> config.Scene | config.Imaging:
+        """What scatters: the scene, or the image's ground where echoes are measured."""
+        measured = self.study.measurement.file is not None
+        return self.study.imaging if measured else self.study.scene
+
+    @property
+    def relief(self) -> float:
+        """Height of the scene's highest obstacle or top, m; of `peaks` where none is declared."""
+        part = self.study.scene
+        heights = [float(getattr(item, "height_m", 0.0)) for item in part.objects]
+        if part.terrain != "flat" or not any(heights):
+            heights.append(part.peak_height_m)
+        return max(heights)
 
     @property
     def x(self) -> float:
@@ -212,7 +228,7 @@ class Sheet:
             return np.full(y.shape, np.inf)
         if not part.spreading:
             return np.full(y.shape, part.snr_db)
-        middle = self.slant_range((self.study.scene.y_min_m + self.study.scene.y_max_m) / 2)
+        middle = self.slant_range((self.scene.y_min_m + self.scene.y_max_m) / 2)
         return part.snr_db - 40 * np.log10(self.slant_range(y) / middle)
 
     def coherence(self, y: ArrayLike, position_errors: ArrayLike = 0.0) -> Floats:
@@ -235,7 +251,7 @@ class Sheet:
         ndarray
             Coherence.
         """
-        part = self.study.scene
+        part = self.scene
         focused = np.exp(-(np.asarray(position_errors, float) ** 2))
         width = np.array([self.unambiguous_width(float(at)) for at in np.ravel(y)])
         filled = np.minimum(1, (part.x_max_m - part.x_min_m) / width).reshape(np.shape(y))
@@ -318,14 +334,14 @@ class Sheet:
         lowest = min(
             float(end[2]) for part in self.apertures for end in (part.transmitter, part.receiver)
         )
-        height = self.study.scene.peak_height_m
+        height = self.relief
         if height >= lowest:
             return np.full(np.shape(y), np.inf)
         return np.asarray(y, float) * height / (lowest - height)
 
     def registration_shift(self, y: ArrayLike) -> Floats:
         """Return by how much the images of a target as high as the relief differ in y, m."""
-        height = self.study.scene.peak_height_m
+        height = self.relief
         lower, upper = (
             aperture.image_position(part, self.x, y, height)[1] for part in self.apertures
         )
@@ -498,7 +514,7 @@ class Sheet:
                 f"{self.unambiguous_range:.2f} m: what lies behind the scene folds into it"
             )
         widths = np.array([self.unambiguous_width(float(at)) for at in y])
-        width = self.study.scene.x_max_m - self.study.scene.x_min_m
+        width = self.scene.x_max_m - self.scene.x_min_m
         if width > _WIDTH_SHARE * widths.min():
             found.append(
                 f"radar.position_spacing_m = {self.study.radar.position_spacing_m}: the scene is "
@@ -527,11 +543,11 @@ class Sheet:
         share = float((self.registration_shift(y) / self.resolution(y)[1]).max())
         if share > _REGISTRATION_SHARE:
             found.append(
-                f"scene.peak_height_m = {self.study.scene.peak_height_m}: the images of a target "
-                f"of this height differ by {share:.2f} of a resolution cell, more than a tenth"
+                f"scene: the images of a target as high as the relief, {self.relief:g} m, "
+                f"differ by {share:.2f} of a resolution cell, more than a tenth"
             )
-        cycle, relief = float(self.height_of_ambiguity(y).min()), self.study.scene.peak_height_m
-        if self.study.scene.terrain != "flat" and relief > 2 * cycle:
+        cycle, relief = float(self.height_of_ambiguity(y).min()), self.relief
+        if relief > 2 * cycle:
             found.append(
                 f"radar.baseline_m = {self.study.radar.baseline_m}: the height of ambiguity, "
                 f"{cycle:.2f} m, is less than half the relief of {relief:g} m: steps of half of it "
@@ -584,7 +600,7 @@ def as_markdown(sheet: Sheet) -> str:
         f"{megabytes:.2f} MB in single precision; the vehicle drives "
         f"{study.vehicle.forward_speed_m_per_s * sheet.scan_duration:.2f} m in it",
         "",
-        f"At x = {sheet.x:g} m, for relief and obstacles of {study.scene.peak_height_m:g} m:",
+        f"At x = {sheet.x:g} m, for relief and obstacles of {sheet.relief:g} m:",
         "",
         "| | near | middle | far |",
         "|---|---:|---:|---:|",

@@ -13,6 +13,8 @@ from vinsar import aperture, baseline, config, design, geometry, radar, trajecto
 CONFIG = Path(__file__).parents[2] / "config"
 WAVELENGTH = 299_792_458.0 / 14e9
 ENDS = ("transmitter", "receiver")
+BOX = {"shape": "box", "x_m": 0.0, "y_m": 13.0, "size_x_m": 0.4, "size_y_m": 0.4}
+PIT = {"shape": "pit", "x_m": 1.0, "y_m": 13.0, "diameter_m": 0.6, "depth_m": 0.4}
 PAPER = validation.load(CONFIG / "paper.yaml")
 
 
@@ -214,3 +216,17 @@ def test_the_sheet_of_the_paper_names_its_figures():
         "| height of ambiguity (m) | 0.366 | 0.471 | 0.577 |",
     ):
         assert words in text
+
+
+@pytest.mark.parametrize(
+    ("scene", "relief"),
+    [
+        ({}, 0.3),
+        ({"terrain": "flat"}, 0.3),
+        ({"terrain": "flat", "objects": [BOX | {"height_m": 0.12}, PIT]}, 0.12),
+        ({"terrain": "peaks", "objects": [BOX | {"height_m": 0.12}]}, 0.3),
+        ({"terrain": "peaks", "objects": [BOX | {"height_m": 0.5}]}, 0.5),
+    ],
+)
+def test_the_relief_is_the_highest_thing_declared(scene, relief):
+    assert sheet_of(scene=scene).relief == relief

@@ -82,7 +82,7 @@ def _resolutions(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
 
 def _heights(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
     cycle, shadow = sheet.height_of_ambiguity(y), sheet.shadow_length(y)
-    relief = sheet.study.scene.peak_height_m
+    relief = sheet.relief
     axes.plot(y, cycle, color=style.BLUE, label="height of ambiguity")
     values = [cycle.max(), relief]
     if np.isfinite(shadow).all():
