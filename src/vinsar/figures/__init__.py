@@ -156,21 +156,44 @@ FIGURES: dict[str, Figure] = {
         ("terrain", "truth"),
         ("figures", "radar", "imaging", "vehicle"),
         ("speed", "speed_error"),
+        title="A vehicle that drives during the scan",
     ),
-    "obstacles": Figure(obstacles.draw_map, ("truth", "dem", "detections"), ("figures", "scene")),
+    "obstacles": Figure(
+        obstacles.draw_map,
+        ("truth", "dem", "detections"),
+        ("figures", "scene"),
+        title="Obstacles and holes",
+    ),
     "roc": Figure(
-        obstacles.draw_roc, (), ("figures", "scene", "detection", "sweeps"), (obstacles.SWEEP,)
+        obstacles.draw_roc,
+        (),
+        ("figures", "scene", "detection", "sweeps"),
+        (obstacles.SWEEP,),
+        title="Detection and false alarms",
     ),
-    "coupling": Figure(coupling.draw, ("coupling",), ("figures",), ("coupling",)),
-    "design": Figure(prediction.draw_sheet, (), ("figures", *design.SECTIONS)),
+    "coupling": Figure(
+        coupling.draw,
+        ("coupling",),
+        ("figures",),
+        ("coupling",),
+        title="Coupling of transmitter and receiver",
+    ),
+    "design": Figure(
+        prediction.draw_sheet, (), ("figures", *design.SECTIONS), title="Design sheet"
+    ),
     "design_check": Figure(
         prediction.draw_check,
         (),
         ("figures", "sweeps", *design.SECTIONS),
         ("snr", "baseline_length", "vibration"),
+        title="Prediction and measurement",
     ),
     "systems": Figure(
-        systems.draw, (), ("figures", "radar", "scene", "vehicle", "sweeps"), ("systems",)
+        systems.draw,
+        (),
+        ("figures", "radar", "scene", "vehicle", "sweeps"),
+        ("systems",),
+        title="The rail beside switched arrays",
     ),
 }
 """The figures by name: the paper's in its order, then those of its section 1.2, of noise, and of

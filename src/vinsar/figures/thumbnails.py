@@ -127,6 +127,12 @@ def _above_ground(axes: Axes, product: xr.Dataset, options: config.Figures) -> N
     _map(axes, height, style.colormap(options.height_colormap), low, high)
 
 
+def _coupling(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    power = product["power"].values.reshape(-1, product.sizes["slant_range"])
+    axes.semilogy(product["slant_range"].values, power.T, color=style.INK, linewidth=0.6)
+
+
 def _error(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
     del options
     limit = 3 * float(product["tolerance"])
@@ -166,6 +172,7 @@ THUMBNAILS: dict[str, Thumbnail] = {
     "accuracy": Thumbnail("height error", _error),
     "focus": Thumbnail("what position errors leave of a point target"),
     "registration": Thumbnail("shift between the images by target height", _shifts),
+    "coupling": Thumbnail("power over range, as received", _coupling),
     "detections": Thumbnail("height above the ground found", _above_ground),
     "detection_accuracy": Thumbnail("what is found, missed and falsely alarmed"),
     "baseline_angle": Thumbnail("height error by the baseline's attitude", _sensitivity),
