@@ -143,7 +143,8 @@ def advance(trajectory: xr.Dataset, *, speed_m_per_s: float, duration_s: float) 
     if speed_m_per_s == 0:
         return trajectory
     # ASSUME: The vehicle stands still during a frequency sweep and moves from sweep to sweep.
-    # ASSUME: Cart, switches and vehicle keep their speed during the scan.
+    # ASSUME: Cart, switches and vehicle keep their speed during the scan, and both antennas take
+    # their echoes at once.
     time = duration_s * np.linspace(-0.5, 0.5, trajectory.sizes["position"])
     way = speed_m_per_s * time[None, :, None] * (np.array(AXES) == "y")
     antennas = {name: trajectory[name].values + way for name in ("transmitter", "receiver")}

@@ -150,7 +150,8 @@ def _told_speed(study: config.Study) -> float:
         return 0.0
     if options.speed_correction == "exact":
         return options.forward_speed_m_per_s
-    # One draw a realization, whatever the speed and the error's size.
+    # ASSUME: The sensor's error is normal and constant during a scan. One draw a realization,
+    # whatever the speed and the error's size.
     error = options.speed_error_m_per_s * _rng(study, _SPEED).standard_normal()
     return options.forward_speed_m_per_s + float(error)
 
