@@ -11,7 +11,7 @@ import itertools
 import re
 import typing
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -585,7 +585,7 @@ def _reference_in_image(height: config.Height, imaging: config.Imaging) -> Itera
 
 @dataclass(frozen=True)
 class _Derived:
-    """What the rules need of the radar."""
+    """What the rules need of the radar; `foremost` is how far ahead of y = 0 an antenna stands."""
 
     frequency: Any
     wavelength: float
@@ -594,8 +594,11 @@ class _Derived:
     unambiguous_range: float
     antennas: Any
     apertures: Any
+    foremost: float
 
+    # A dozen rules ask, and the cases of a sweep have few radars between them.
     @classmethod
+    @lru_cache(maxsize=32)
     def of(cls, section: config.Radar) -> _Derived:
         frequency = radar.frequencies(
             section.start_frequency_hz, section.stop_frequency_hz, section.frequency_count
@@ -609,13 +612,10 @@ class _Derived:
             unambiguous_range=radar.unambiguous_range(float(frequency[1] - frequency[0])),
             antennas=antennas,
             apertures=trajectory.apertures(antennas),
+            foremost=max(
+                0.0, *(antennas[name].values[..., 1].max() for name in ("transmitter", "receiver"))
+            ),
         )
-
-    @property
-    def foremost(self) -> float:
-        """How far ahead of y = 0 an antenna stands, m."""
-        y = [float(self.antennas[name][..., 1].max()) for name in ("transmitter", "receiver")]
-        return max(0.0, *y)
 
     def reach(
         self, part: config.Scene | config.Imaging, behind_m: float = 0.0
