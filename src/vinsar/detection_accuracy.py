@@ -11,7 +11,7 @@ from vinsar import scene, variables
 from vinsar.detection import FREE, UNKNOWN, regions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -26,6 +26,9 @@ HEIGHT_THRESHOLDS = np.round(np.arange(0.01, 0.401, 0.01), 2)
 
 AMPLITUDE_THRESHOLDS = 10 ** (np.arange(0.5, 15.01, 0.5) / 10)
 """Thresholds of the 2-D detector's ROC: power ratios of 0.5 to 15 dB."""
+
+WANTED = 0.9
+"""Probability of detection at which false alarms are compared."""
 
 # Heights closer than this are the same.
 _SLACK_M = 1e-9
@@ -179,3 +182,89 @@ def curves(case: xr.Dataset, least_height_m: float) -> dict[str, Curve]:
             case[f"{name}_threshold"].values, probability, 100 * false.mean("realization").values
         )
     return result
+
+
+def as_markdown(
+    sweep: xr.Dataset, objects: Sequence[config.SceneObject], options: config.Detection
+) -> str:
+    """Return what a sweep over a scene with objects found, as tables in Markdown.
+
+    Parameters
+    ----------
+    sweep
+        Product ``sweep`` over one key.
+    objects
+        The objects of its scene.
+    options
+        Section ``detection`` of the configuration; its threshold is the operating point.
+
+    Returns
+    -------
+    str
+        False alarms where 90 % are found, detection by object, and what the map says of each.
+    """
+    key = str(sweep["height_found"].dims[0])
+    cases = [sweep.isel({key: number}) for number in range(sweep.sizes[key])]
+    label = sweep[key].attrs["long_name"]
+    least = 100 * options.threshold_m
+    lines = [
+        f"False alarms on 100 m2 where {100 * WANTED:g} % of the obstacles of {least:g} cm and "
+        f"more are found, with the threshold, and on the heights at {least:g} cm:",
+        "",
+        f"| {label} | heights | image alone | heights at {least:g} cm | found there |",
+        "|---|---|---|---|---|",
+    ]
+    for case in cases:
+        both = curves(case, options.threshold_m)
+        at = int(np.abs(both["height"].threshold - options.threshold_m).argmin())
+        lines.append(
+            f"| {float(case[key]):g} | {_reached(both['height'], _metres)} | "
+            f"{_reached(both['amplitude'], _decibels)} | {both['height'].false_alarms[at]:.2g} | "
+            f"{100 * both['height'].probability[at]:.1f} % |"
+        )
+    heads = " | ".join(f"{float(case[key]):g}" for case in cases)
+    lines += [
+        "",
+        f"Probability of detection on the heights at {least:g} cm by {label}, and shares of the "
+        f"object's ground on the map at {label} = {float(cases[len(cases) // 2][key]):g}:",
+        "",
+        f"| object | height (m) | at y (m) | {heads} | alarm | unknown | free |",
+        "|---|---|---|" + "---|" * (len(cases) + 3),
+    ]
+    mean = cases[len(cases) // 2].mean("realization")
+    for number, part in enumerate(objects):
+        found = [
+            float(
+                case["height_found"]
+                .sel(height_threshold=options.threshold_m, method="nearest")
+                .isel(object=number)
+                .mean()
+            )
+            for case in cases
+        ]
+        unknown, free = (float(mean[f"object_{name}"][number]) for name in ("unknown", "free"))
+        lines.append(
+            f"| {part.shape} | {_height(part):g} | {part.y_m:g} | "
+            + " | ".join(f"{share:.2f}" for share in found)
+            + f" | {abs(1 - unknown - free):.2f} | {unknown:.2f} | {free:.2f} |"
+        )
+    lines += [
+        "",
+        f"Of the true shadow the map has {100 * float(mean['shadow_unknown']):.0f} % as unknown, "
+        f"of visible ground beside objects {100 * float(mean['visible_unknown']):.1f} %. "
+        f"{sweep.sizes['realization']} realizations of {float(mean['scene_area']):.0f} m2.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _metres(threshold: float) -> str:
+    return f"{100 * threshold:.0f} cm"
+
+
+def _decibels(threshold: float) -> str:
+    return f"{10 * np.log10(threshold):.1f} dB"
+
+
+def _reached(curve: Curve, write: Callable[[float], str]) -> str:
+    point = curve.at(WANTED)
+    return "not reached" if point is None else f"{point[1]:.2g} at {write(point[0])}"

@@ -128,3 +128,40 @@ def test_a_scene_without_objects_has_nothing_but_false_alarms():
     found = evaluate(height=[(0.3, 0, 11)], objects=())
     assert found.sizes["object"] == 0
     assert at(found, "height_false_alarms", 0.1) == 1
+
+
+def swept(*cases):
+    """Make a sweep over the roughness, a realization a case, from what they found."""
+    data = {
+        name: np.stack([case[name].values.astype(float) for case in cases])[:, None]
+        for name in cases[0].data_vars
+    }
+    for name, variable in variables.SWEEP.items():
+        sizes = {"region": 3, "channel": 2, "ground_axis": 2}
+        data[name] = np.ones((len(cases), 1, *(sizes[dim] for dim in variable.dims)))
+    axis = (0.01 * np.arange(len(cases)), {"long_name": "scene.roughness_std_m"})
+    coords = {name: cases[0][name].values for name in cases[0].coords if name not in "xy"}
+    return variables.sweep_dataset(data, {"scene_roughness_std_m": axis}, coords)
+
+
+def test_the_roc_is_of_obstacles_above_ground_and_of_alarms_by_area():
+    bright = [(ratio(3.2), -1, 11), (ratio(5.2), 0, 12.5), (ratio(2.2), -1.5, 12.5)]
+    sweep = swept(
+        evaluate(height=[(0.205, -1, 11), (0.055, 0, 12.5)], contrast=bright),
+        evaluate(height=[(0.155, -1, 11)], contrast=bright[:1]),
+    )
+    case = sweep.isel(scene_roughness_std_m=0)
+    both = detection_accuracy.curves(case, 0.2)
+    area = 41 * 31 * 0.01
+    # The box alone counts: it is found up to 20 cm, beside no false alarm from 6 cm on.
+    assert both["height"].at(0.9) == (pytest.approx(0.2), 0.0)
+    assert both["height"].false_alarms[2] == pytest.approx(100 / area)
+    assert both["amplitude"].at(0.9) == (pytest.approx(ratio(3)), pytest.approx(100 / area))
+    # Nothing is that high, and then nothing is found or missed.
+    assert np.isnan(detection_accuracy.curves(case, 0.3)["height"].probability).all()
+    assert detection_accuracy.curves(case, 0.3)["height"].at(0.9) is None
+    text = detection_accuracy.as_markdown(sweep, OBJECTS, OPTIONS)
+    assert f"| 0 | 0 at 20 cm | {100 / area:.2g} at 3.0 dB | 0 | 100.0 % |" in text
+    assert "| 0.01 | 0 at 15 cm | 0 at 3.0 dB | 0 | 100.0 % |" in text
+    assert "| box | 0.2 | 11 | 1.00 | 1.00 |" in text
+    assert "| pit | -0.3 | 12 | 0.00 | 0.00 |" in text

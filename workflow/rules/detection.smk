@@ -35,3 +35,23 @@ rule detection_accuracy:
         configuration=stage_configuration("detection_accuracy"),
     script:
         "../scripts/stage.py"
+
+
+rule detection_summary:
+    input:
+        **sweep_files("roughness"),
+        code=sources_of("detection_accuracy", script="detection_summary"),
+    output:
+        report(
+            "<results>/detection.md",
+            caption="../report/detection.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/detection_summary.log",
+    benchmark:
+        "<benchmarks>/detection_summary.tsv"
+    params:
+        configuration=configuration("scene", "detection", "sweeps"),
+    script:
+        "../scripts/detection_summary.py"

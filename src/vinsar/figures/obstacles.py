@@ -27,7 +27,6 @@ _CLASSES = {
 }
 _PATCH = "#35a7e8"
 _LEAST_RANGE_M = 0.05
-_WANTED = 0.9
 
 _HEIGHT = [
     sweeps.Look("", style.BLUE, "-", "o"),
@@ -190,7 +189,7 @@ def _draw_curves(axes: Axes, sweep: xr.Dataset, options: config.Detection) -> No
     curve = detection_accuracy.curves(middle, options.threshold_m)["amplitude"]
     _curve(axes, curve, _AMPLITUDE, f"image alone, {100 * float(middle[key]):g} cm")
     most = max(most, float(curve.false_alarms.max()))
-    axes.axhline(_WANTED, color=style.GREY, linestyle=":", linewidth=0.8)
+    axes.axhline(detection_accuracy.WANTED, color=style.GREY, linestyle=":", linewidth=0.8)
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.4)
     axes.set_xlim(-0.015, 1.6 * most)
     axes.set_ylim(0, 1.03)

@@ -1,0 +1,16 @@
+"""Write how well obstacles and holes are found as tables."""
+
+from job import job, read_products
+
+from vinsar import config, detection_accuracy, storage
+from vinsar.figures import obstacles
+
+with job(snakemake):
+    study = config.Study.part(snakemake.params.configuration)
+    sweep = read_products(snakemake)[f"sweeps/{obstacles.SWEEP}"]
+    sections = (
+        config.swept_section(study, obstacles.SWEEP, name) for name in ("scene", "detection")
+    )
+    scene, options = sections
+    with storage.atomic(snakemake.output[0]) as path:
+        path.write_text(detection_accuracy.as_markdown(sweep, scene.objects, options))
