@@ -200,7 +200,7 @@ def _draw_curves(axes: Axes, sweep: xr.Dataset, options: config.Detection) -> No
     mark = f"threshold of {100 * options.threshold_m:g} cm"
     axes.plot([], [], linestyle="", marker="*", markersize=7, color=_HEIGHT[0].colour, label=mark)
     axes.legend(
-        title="detector, roughness of the ground", loc="center left", bbox_to_anchor=(0.05, 0.42),
+        title="detector, roughness", loc="center left", bbox_to_anchor=(0.05, 0.42),
         alignment="left",
     )  # fmt: skip
 
