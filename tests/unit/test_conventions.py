@@ -11,7 +11,11 @@ from vinsar import provenance, storage, sweep, variables
 from vinsar.constants import REGIONS
 
 HIGH = 3
-LABELS = variables.LABELS | {"region": REGIONS, "target": ("near", "far")}
+LABELS = {
+    dim: variables.LABELS.get(dim, ("one", "other"))
+    for dim, declared in variables.COORDINATES.items()
+    if declared.kind == "label"
+} | {"region": REGIONS}
 # What is not among them is as long as its place.
 SIZES = {
     dim: len(LABELS.get(dim, range(2 + place))) for place, dim in enumerate(variables.COORDINATES)
