@@ -22,6 +22,7 @@ pathvars:
     benchmarks="<results>/benchmarks",
 
 
+include: "workflow/rules/own_data.smk"
 include: "workflow/rules/scene.smk"
 include: "workflow/rules/echo.smk"
 include: "workflow/rules/imaging.smk"
@@ -43,7 +44,7 @@ rule all:
             figure=STUDY.outputs.figures,
             suffix=STUDY.figures.formats,
         ),
-        "<results>/accuracy.json",
+        expand("<results>/{name}.json", name={"accuracy"}.intersection(STAGES)),
         expand(
             "<results>/claims.{suffix}",
             suffix=["json", "md"] if STUDY.outputs.claims else [],

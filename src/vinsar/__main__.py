@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from vinsar import config, design, ingest, lineage, reproduction, validation
+from vinsar import config, design, ingest, lineage, reproduction
 
 
 def _study(name: str, files: list[str]) -> config.Study | None:
@@ -15,10 +15,10 @@ def _study(name: str, files: list[str]) -> config.Study | None:
     own = Path("config") / f"{name}.yaml"
     paths = [Path("config/paper.yaml"), *([own] if own.stem != "paper" else [])]
     if files:
-        return validation.load(paths[0], *files)
+        return ingest.load(paths[0], *files)
     if not all(path.is_file() for path in paths):
         return None
-    return validation.load(*paths)
+    return ingest.load(*paths)
 
 
 def _trace(arguments: argparse.Namespace) -> int:
@@ -108,6 +108,11 @@ def _known_study(name: str, files: list[str]) -> config.Study:
     return study
 
 
+def _export(arguments: argparse.Namespace) -> int:
+    ingest.export(arguments.folder, arguments.file)
+    return 0
+
+
 def main() -> int:
     """Answer a command; return the exit code."""
     parser = argparse.ArgumentParser(prog="./run", description=__doc__)
@@ -139,6 +144,10 @@ def main() -> int:
     diff.add_argument("first")
     diff.add_argument("second")
     diff.set_defaults(answer=_diff)
+    export = commands.add_parser("export", help="write a study's echo as a measurement")
+    export.add_argument("folder")
+    export.add_argument("file")
+    export.set_defaults(answer=_export)
     arguments = parser.parse_args()
     try:
         return int(arguments.answer(arguments))

@@ -7,6 +7,7 @@ its digest, when it was made, where, and how long it took.
 from __future__ import annotations
 
 import json
+import os
 import platform
 import re
 from dataclasses import dataclass, field
@@ -69,7 +70,9 @@ def write_record(
         "job": job,
         "threads": threads,
         "inputs": {
-            name: Path(source).relative_to(folder).as_posix() for name, source in inputs.items()
+            # A file of the user's own lies elsewhere.
+            name: Path(os.path.relpath(source, folder)).as_posix()
+            for name, source in inputs.items()
         },
         "started": _instant(started),
         "ended": _instant(started + seconds),
@@ -262,8 +265,20 @@ def _trace(path: Path, folder: Path, study: config.Study | None, expected: str |
     sources = json.loads(attributes.get("vinsar_inputs", "{}"))
     for name, sha in sources.items():
         source = (record or {}).get("inputs", {}).get(name, f"{name}.nc")
-        origin.inputs.append(_trace(folder / source, folder, study, sha))
+        if source.startswith("../"):
+            origin.inputs.append(_own_file(folder / source, sha))
+        else:
+            origin.inputs.append(_trace(folder / source, folder, study, sha))
     return origin
+
+
+def _own_file(path: Path, expected: str) -> Origin:
+    """Return a file of the user's own, whose origin nobody knows here."""
+    if not path.is_file():
+        return Origin(path, {}, ["missing"])
+    same = provenance.sha256(path) == expected
+    changes = [] if same else ["not the bytes that the result above was made from"]
+    return Origin(path.resolve(), {"vinsar_stage": "own file"}, changes)
 
 
 def _record(path: Path, folder: Path) -> dict[str, Any] | None:
@@ -328,9 +343,8 @@ def _lines(origin: Origin, first: str, rest: str, seen: set[Path]) -> Iterator[s
         values = leaves(json.loads(origin.attributes.get("vinsar_configuration", "{}")))
         details += [f"{key} = {json.dumps(value)}" for key, value in values]
         code = json.loads(origin.attributes.get("vinsar_code", "{}"))
-        details += [
-            f"code: {len(code)} files, {origin.attributes.get('vinsar_commit', '')}".rstrip(", ")
-        ]
+        commit = origin.attributes.get("vinsar_commit", "")
+        details += [f"code: {len(code)} files, {commit}".rstrip(", ")] if code else []
     children = [] if again else origin.inputs
     bar = "│  " if children else "   "
     for detail in details:
@@ -386,6 +400,8 @@ def verify(folder: str | Path, study: config.Study | None = None) -> dict[str, l
         made_from = json.loads(record["provenance"].get("vinsar_inputs", "{}"))
         for key, sha in made_from.items():
             source = record["inputs"].get(key, f"{key}.nc")
+            if source not in shas and (folder / source).is_file():
+                shas[source] = provenance.sha256(folder / source)
             if shas.get(source) != sha:
                 problems.append(f"stale: made from another {source}")
         problems += [f"stale: {text}" for text in _differences(record["provenance"], study)]

@@ -650,6 +650,13 @@ def _measured_in_motion(
         )
 
 
+def _claims_judged(measurement: config.Measurement, outputs: config.Outputs) -> Iterator[Fault]:
+    if measurement.file is not None and outputs.claims:
+        yield Fault(
+            "outputs.claims", True, "must be false with measurement.file: no truth decides them"
+        )
+
+
 def _drives_short(
     radar: config.Radar, scene: config.Scene, imaging: config.Imaging, vehicle: config.Vehicle
 ) -> Iterator[Fault]:
@@ -931,6 +938,7 @@ _ACROSS_SECTIONS: tuple[Rule, ...] = (
     _reference_in_image,
     _object_heights,
     _measured_in_motion,
+    _claims_judged,
     _drives_short,
     _unambiguous,
     _facets_fine,

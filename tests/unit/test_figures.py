@@ -50,6 +50,7 @@ PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
 OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr", "moving", "systems"]
 NAMES = [
     "summary",
+    "measured",
     *("fig1", "fig2", "fig3", *(f"fig3{letter}" for letter in "abcdefgh"), "fig4", "fig5"),
     *("baseline_length", "baseline_angle", "baseline_vibration", "snr", "moving"),
     *("obstacles", "roc"),
@@ -1193,7 +1194,31 @@ def test_figures_that_cannot_be_drawn_are_refused_before_anything_runs():
     study = make_study(outputs={"figures": asked, "claims": False})
     study = study.model_copy(update={"sweeps": {}})
     with pytest.raises(validation.ConfigurationError) as caught:
-        figures.check(study)
+        figures.check(study, pipeline.STAGES)
     keys = [fault.key for fault in caught.value.faults]
     assert keys == [f"outputs.figures[{number}]" for number in (1, 2, 3)]
     assert "'vibration'" in caught.value.faults[1].allowed
+
+
+def test_measured_echoes_have_the_figures_that_need_no_truth():
+    study = make_study(
+        measurement={"file": "echo.nc"},
+        outputs={"figures": ["measured", "fig1", "fig4", "snr"], "claims": False},
+    )
+    known = {*pipeline.stages(study), *pipeline.from_files(study)}
+    with pytest.raises(validation.ConfigurationError) as caught:
+        figures.check(study, known)
+    assert [fault.value for fault in caught.value.faults] == ["fig1", "fig4", "snr"]
+    assert all("there are fig2, measured" in fault.allowed for fault in caught.value.faults)
+
+
+def test_the_measured_figure_colours_heights_by_the_reconstruction(
+    products: pipeline.Products, study: config.Study
+) -> None:
+    rebuilt = {name: products[name].copy(deep=True) for name in chain.MEASURED_INPUTS}
+    height = rebuilt["dem"]["height"].values
+    height[...] = np.linspace(-0.12, 0.31, height.size).reshape(height.shape)
+    # One failed cell in more than a thousand does not stretch the colours; NaN has none.
+    height[3, 3], height[5, 5] = 7.0, np.nan
+    shown = draw("measured", rebuilt, study).axes[-2].images[0]
+    assert shown.get_clim() == pytest.approx((-0.15, 0.35))

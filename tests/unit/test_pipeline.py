@@ -119,3 +119,13 @@ def test_the_looks_count_resolution_cells(study, products):
     # 31 pixels of 5 cm against cells of about 0.074 m x 0.20 m (0.6 m aperture, 11.2 m range).
     found = pipeline.looks(products["trajectory"], wide)
     assert found == pytest.approx(1.55**2 / (0.0763 * 0.2), rel=0.03)
+
+
+def test_measured_echoes_leave_out_what_needs_the_truth(study):
+    measured = changed(study, "measurement", file="echo.nc")
+    assert pipeline.from_files(measured) == pipeline.MEASURED
+    assert set(pipeline.stages(measured)) >= {*PROCESSING, "registration"}
+    truth = {"terrain", "facets", "true_trajectory", "visibility", "truth", "echo", "accuracy"}
+    assert not {*truth, "focus", "baseline_angle"} & set(pipeline.stages(measured))
+    assert pipeline.from_files(study) == ()
+    assert pipeline.stages(study) == pipeline.STAGES

@@ -39,9 +39,15 @@ def nothing(*_):
     pass
 
 
-def run(study, finished=None, keep=nothing, progress=nothing, compute=in_turn):
+def run(study, finished=None, keep=nothing, progress=nothing, compute=in_turn, given=None):
     return sweep.run(
-        study, "quick", finished=finished or {}, keep=keep, progress=progress, compute=compute
+        study,
+        "quick",
+        finished=finished or {},
+        keep=keep,
+        progress=progress,
+        compute=compute,
+        given=given,
     )
 
 
@@ -398,3 +404,18 @@ def test_objects_themselves_are_not_swept(tiny):
     over = {"scene.objects": [[], [{"shape": "pit"}]]}
     with pytest.raises(validation.ConfigurationError, match="must be the same in all cases"):
         run(with_sweep(with_objects(tiny), over))
+
+
+def test_every_case_has_the_terrain_that_is_given(tiny):
+    scene = tiny.scene.model_copy(update={"terrain": "file", "file": "dem.tif"})
+    own = tiny.model_copy(update={"scene": scene})
+    terrain = pipeline.run(tiny, only="terrain")["terrain"]
+    given = {"elevation": terrain.assign(height=terrain["height"].copy(data=terrain["height"] / 2))}
+    rows = {}
+    found = run(with_sweep(own, {"echo.occlusion": [True]}), keep=rows.update, given=given)
+    accuracy = pipeline.run(own, "accuracy", given)["accuracy"]
+    np.testing.assert_array_equal(found["std"].values[0, 0], accuracy["std"])
+    # Another file of the same name is another case: nothing of an earlier run is taken for it.
+    other = {"elevation": terrain}
+    again = run(with_sweep(own, {"echo.occlusion": [True]}), finished=rows, given=other)
+    assert np.abs(again["std"] - found["std"]).min() > 0

@@ -60,6 +60,14 @@ def test_the_paper_is_wise():
         ({"radar__stop_frequency_hz": 12e9}, "radar.stop_frequency_hz", "must exceed"),
         ({"radar__baseline_m": -0.3}, "radar.baseline_m", "greater than 0"),
         ({"radar__position_spacing_m": 0.03}, "radar.position_spacing_m", "must divide"),
+        ({"scene__terrain": "file"}, "scene.file", "must name the file"),
+        ({"scene__file": "dem.tif"}, "scene.file", "is not read for scene.terrain 'peaks'"),
+        ({"measurement__file": "echo.nc"}, "outputs.claims", "must be false"),
+        (
+            {"measurement__file": "echo.nc", "vehicle__forward_speed_m_per_s": 1.0},
+            "vehicle.forward_speed_m_per_s",
+            "must be 0",
+        ),
         ({"scene__x_max_m": -3.0}, "scene.x_max_m", "must exceed x_min_m"),
         ({"scene__terrain_spacing_m": 0.011}, "scene.terrain_spacing_m", "must divide"),
         ({"scene__reflectivity_offset": 0.1}, "scene.reflectivity_offset", "at least 0.24"),
@@ -307,3 +315,35 @@ def test_a_coupling_from_beyond_the_gate_is_unwise():
     )
     assert ["the coupling comes from beyond it, 1.2 m" in found for found in
             validation.advice(validation.check(raw))] == [True]  # fmt: skip
+
+
+def test_measured_echoes_have_no_scene_to_be_wrong():
+    raw = changed(scene__facet_size_m=2.0, outputs__claims=False, measurement__file="echo.nc")
+    assert validation.check(raw).scene.facet_size_m == 2.0
+    assert "scene.facet_size_m" in faults(raw | {"measurement": {"file": None}})
+
+
+def test_sweeps_and_variants_keep_to_the_one_file_of_a_terrain():
+    sweep = {"realizations": 1, "base": {}, "over": {"scene.x_max_m": [2.5, 2.0]}}
+    raw = changed(
+        scene__terrain="file",
+        scene__file="dem.tif",
+        sweeps={"wide": sweep},
+        variants={
+            "turned": {"scene": {"heading_deg": 90.0}},
+            "level": {"scene": {"terrain": "flat", "file": None}},
+            "lower": {"radar": {"rail_height_m": 1.8}},
+            "measured": {"measurement": {"file": "echo.nc"}, "outputs": {"claims": False}},
+        },
+    )
+    study = validation.check(raw)
+    with pytest.raises(validation.ConfigurationError) as caught:
+        validation.sweep_studies(study, "wide")
+    (fault,) = caught.value.faults
+    assert "{'scene.x_max_m': 2.0}: scene.x_max_m" in fault.key
+    with pytest.raises(validation.ConfigurationError) as caught:
+        validation.variants(study)
+    assert [fault.key for fault in caught.value.faults] == [
+        "variants.turned: scene.heading_deg",
+        "variants.measured: measurement.file",
+    ]

@@ -1,16 +1,30 @@
 # The checked configuration, and the parts of it and of the library that rules depend on.
 import os
-from functools import cache
+from functools import cache, partial
 
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
-from vinsar import claims, figures, pipeline, provenance, sweep, systems, validation
+from vinsar import config as vinsar_config
+from vinsar import (
+    claims,
+    figures,
+    ingest,
+    pipeline,
+    provenance,
+    sweep,
+    systems,
+    validation,
+)
 from vinsar import report as study_report
 
 try:
-    STUDY = validation.check(config)
-    figures.check(STUDY)
+    STUDY = ingest.check(config)
+    STAGES = pipeline.stages(STUDY)
+    figures.check(STUDY, {*STAGES, *pipeline.from_files(STUDY)})
+    if workflow.is_main_process:
+        # For its faults alone: a file of the user's own is found wanting before anything runs.
+        ingest.read(STUDY)
 except validation.ConfigurationError as error:
     raise WorkflowError(str(error)) from None
 
@@ -41,16 +55,31 @@ def stage_configuration(name):
     return configuration(*pipeline.STAGES[name].sections)
 
 
+def refuse_without_truth(name, wildcards):
+    raise WorkflowError(
+        f"There is no '{name}' in the study '{STUDY.study}': its echoes are measured "
+        "(measurement.file), and what needs the true scene is left out."
+    )
+
+
+def if_made(name, files):
+    """Files that a rule reads, unless the study is without the rule's stage."""
+    return files if name in STAGES else partial(refuse_without_truth, name)
+
+
 def stage_sources(name):
     # The pipeline binds the configuration to the stage; what else it imports is not run.
-    return [
-        *sources_of(*pipeline.STAGES[name].modules, script="stage"),
-        os.path.relpath(pipeline.__file__),
-    ]
+    library = sources_of(*pipeline.STAGES[name].modules, script="stage")
+    return if_made(name, [*library, os.path.relpath(pipeline.__file__)])
 
 
 def product_files(*names):
     return {name: f"<results>/{name}.nc" for name in names}
+
+
+def own_heights():
+    """The heights of the user's own, if the terrain is made of them."""
+    return product_files(*{"elevation"}.intersection(pipeline.from_files(STUDY)))
 
 
 def sweep_files(*names):
@@ -111,7 +140,8 @@ def wanted_products():
     }
     if STUDY.outputs.claims:
         read |= {*claims.INPUTS}
-    return list(pipeline.needed({*read, "accuracy", "focus"}))
+    read |= {"dem", "accuracy", "focus"}
+    return list(pipeline.needed(read.intersection(STAGES), STAGES))
 
 
 def shown_sweeps():

@@ -1,9 +1,7 @@
 # The figures, each as PDF, SVG and PNG; the panels of the third are drawn together. That of the design
 # sheet can be asked for in any study.
 
-for FIGURE in dict.fromkeys(
-    [*SINGLE, *(["fig3_panels"] if PANELS else []), "design"]
-):
+for FIGURE in dict.fromkeys([*SINGLE, *(["fig3_panels"] if PANELS else []), "design"]):
 
     rule:
         name:

@@ -25,7 +25,8 @@ rule claims:
 
 rule variants:
     input:
-        code=sources_of("variants", script="variants"),
+        **own_heights(),
+        code=if_made("accuracy", sources_of("variants", script="variants")),
     output:
         report(
             "<results>/variants.md",

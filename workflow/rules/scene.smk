@@ -65,6 +65,7 @@ rule roughness:
 
 rule terrain:
     input:
+        **own_heights(),
         roughness="<results>/roughness.nc",
         code=stage_sources("terrain"),
     output:

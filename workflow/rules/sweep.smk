@@ -4,7 +4,8 @@ import re
 
 rule sweep:
     input:
-        code=sources_of("sweep", script="sweep"),
+        **own_heights(),
+        code=if_made("accuracy", sources_of("sweep", script="sweep")),
     output:
         "<results>/sweeps/{sweep}.nc",
     log:

@@ -81,10 +81,11 @@ def record(snakemake, started, seconds):
 
 
 def stage_of(snakemake, path):
-    """Return what an output is called in its provenance: its figure, its sweep, or its rule."""
+    """Return what an output is called in its provenance: its figure, its sweep, or its stage."""
     if snakemake.rule == "sweep":
         return f"sweep {snakemake.wildcards.sweep}"
-    return Path(path).stem if "/figures/" in path else snakemake.rule
+    several = "/figures/" in path or snakemake.rule == "measurement"
+    return Path(path).stem if several else snakemake.rule
 
 
 def product_paths(snakemake):

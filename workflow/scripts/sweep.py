@@ -4,7 +4,7 @@ import json
 import logging
 from pathlib import Path
 
-from job import attributes, job
+from job import attributes, job, read_products
 from progress import Progress
 
 from vinsar import checkpoint, cluster, provenance, storage, sweep, validation
@@ -26,6 +26,7 @@ def main():
             keep=finished.keep,
             progress=progress,
             compute=compute,
+            given=read_products(snakemake),
         )
     storage.write(result, output, "sweep", attributes(snakemake, f"sweep {name}"))
     finished.remove()

@@ -31,7 +31,7 @@ from vinsar.figures.files import save
 from vinsar.figures.style import colormap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     import matplotlib.figure
 
@@ -78,6 +78,7 @@ FIGURES: dict[str, Figure] = {
         title="Front sheet",
         numbers=captions.height_error,
     ),
+    "measured": Figure(chain.draw_measured, chain.MEASURED_INPUTS, ("figures",)),
     "fig1": Figure(
         acquisition.draw,
         (),
@@ -200,20 +201,30 @@ FIGURES: dict[str, Figure] = {
 obstacles."""
 
 
-def check(study: config.Study) -> None:
-    """Refuse a study that asks for figures that do not exist or lack their sweeps.
+def check(study: config.Study, products: Collection[str]) -> None:
+    """Refuse a study that asks for figures that do not exist or cannot be drawn.
 
     Parameters
     ----------
     study
         The configuration.
+    products
+        Names of the products that the study has.
 
     Raises
     ------
     validation.ConfigurationError
-        If a figure is unknown, stands there twice, or shows a sweep that the study lacks.
+        If a figure is unknown, stands there twice, shows a sweep that the study lacks, or needs
+        the true scene, which measured echoes come without.
     """
     faults = []
+    measured = study.measurement.file is not None
+    possible = [
+        name
+        for name, figure in FIGURES.items()
+        if not (measured and (figure.sweeps or "scene" in figure.sections))
+        and set(figure.inputs) <= set(products)
+    ]
     asked = study.outputs.figures
     for number, name in enumerate(asked):
         where = f"outputs.figures[{number}]"
@@ -222,6 +233,10 @@ def check(study: config.Study) -> None:
             continue
         if name in asked[:number]:
             faults.append(validation.Fault(where, name, "stands there twice"))
+        if name not in possible:
+            allowed = f"needs the true scene, without which there are {', '.join(possible)}"
+            faults.append(validation.Fault(where, name, allowed))
+            continue
         faults += [
             validation.Fault(where, name, f"shows the sweep '{sweep}', which `sweeps` lacks")
             for sweep in FIGURES[name].sweeps

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
@@ -26,6 +27,7 @@ _SURFACE_CELLS = 90
 _SURFACE_HEIGHT_SHARE = 0.4
 _LEAST_SURFACE_MM = 34.0
 _TITLE_MM = 7.0
+_FAILED_PERCENT = 0.1
 
 
 @dataclass(frozen=True)
@@ -49,29 +51,36 @@ class Panel:
     layer: Callable[[Products, config.Study], Layer]
 
 
-def height_limits(truth: xr.Dataset) -> tuple[float, float]:
+def height_limits(heights: xr.Dataset, outside_percent: float = 0.0) -> tuple[float, float]:
     """Return the limits of the height colours, of truth and reconstruction alike.
 
     Parameters
     ----------
-    truth
-        Product ``truth``.
+    heights
+        Product ``truth`` or, where none is known, ``dem``.
+    outside_percent
+        Share of the heights that may lie beyond either limit: a few failed cells must not flatten
+        the colours of all others.
 
     Returns
     -------
     tuple of float
-        The range of the true heights, rounded outwards to 5 cm and at least 10 cm wide, m.
+        The range of the heights, rounded outwards to 5 cm and at least 10 cm wide, m.
     """
-    heights = truth["height"].values
-    low = np.floor(round(float(np.nanmin(heights)) / _HEIGHT_STEP_M, 6)) * _HEIGHT_STEP_M
-    high = np.ceil(round(float(np.nanmax(heights)) / _HEIGHT_STEP_M, 6)) * _HEIGHT_STEP_M
+    known = heights["height"].values[np.isfinite(heights["height"].values)]
+    ends = np.percentile(known, [outside_percent, 100 - outside_percent]) if known.size else (0, 0)
+    low = np.floor(round(float(ends[0]) / _HEIGHT_STEP_M, 6)) * _HEIGHT_STEP_M
+    high = np.ceil(round(float(ends[1]) / _HEIGHT_STEP_M, 6)) * _HEIGHT_STEP_M
     if high - low < 2 * _HEIGHT_STEP_M:
         low, high = low - _HEIGHT_STEP_M, high + _HEIGHT_STEP_M
     return float(low), float(high)
 
 
 def _height(data: xr.DataArray, products: Products, study: config.Study) -> Layer:
-    limits = height_limits(products["truth"])
+    if "truth" in products:
+        limits = height_limits(products["truth"])
+    else:
+        limits = height_limits(products["dem"], _FAILED_PERCENT)
     return Layer(
         data,
         style.colormap(study.figures.height_colormap, "figures.height_colormap"),
@@ -124,7 +133,8 @@ def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
     data = products["unwrapped"]["phase"]
     known = data.values[np.isfinite(data.values)]
     # A few failed cells must not flatten the colours of all others.
-    low, high = np.percentile(known, [0.1, 99.9]) / (np.pi / 2) if known.size else (-2.0, 2.0)
+    ends = [_FAILED_PERCENT, 100 - _FAILED_PERCENT]
+    low, high = np.percentile(known, ends) / (np.pi / 2) if known.size else (-2.0, 2.0)
     first, last = int(np.floor(low)), int(np.ceil(high))
     limits = (first * np.pi / 2, max(last, first + 1) * np.pi / 2)
     return Layer(
@@ -135,6 +145,13 @@ def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
         "phase (rad)",
         maps.beyond(data.values, limits),
         phase=True,
+    )
+
+
+def _coherence(products: Products, study: config.Study) -> Layer:
+    del study
+    return Layer(
+        products["interferogram"]["coherence"], style.colormap("gray"), (0.0, 1.0), "coherence"
     )
 
 
@@ -149,6 +166,19 @@ PANELS: dict[str, Panel] = {
     "h": Panel("reconstructed height", "dem", _reconstructed_height),
 }
 """The paper's eight panels; (a) is a surface and a map."""
+
+
+MEASURED: tuple[Panel, ...] = (
+    PANELS["c"],
+    PANELS["d"],
+    Panel("coherence", "interferogram", _coherence),
+    PANELS["e"],
+    PANELS["g"],
+    PANELS["h"],
+)
+"""What there is to show of the chain without the truth."""
+
+MEASURED_INPUTS: tuple[str, ...] = tuple(dict.fromkeys(panel.product for panel in MEASURED))
 
 
 def panel_inputs(letter: str) -> tuple[str, ...]:
@@ -245,6 +275,39 @@ def draw_single(letter: str, products: Products, study: config.Study) -> Figure:
     return figure
 
 
+@style.styled
+def draw_measured(products: Products, study: config.Study) -> Figure:
+    """Draw the chain from the images to the height, without any truth.
+
+    Parameters
+    ----------
+    products
+        Those of `MEASURED_INPUTS`.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    left, bottom, pitch, width = 12.5, 10.0, 56.0, 38.0
+    _, height = maps.fit(products["dem"]["height"], width, 60)
+    figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + 2 * (height + _TITLE_MM))
+    for place, panel in enumerate(MEASURED):
+        row, column = divmod(place, 3)
+        box = left + column * pitch, bottom + (1 - row) * (height + _TITLE_MM), width, height
+        _draw(
+            figure,
+            box,
+            panel.layer(products, study),
+            f"({'abcdef'[place]}) {panel.title}",
+            label_x=row == 1,
+            label_y=column == 0,
+        )
+    return figure
+
+
 def _map(
     figure: Figure,
     box: tuple[float, float, float, float],
@@ -257,9 +320,22 @@ def _map(
     label_y: bool = True,
 ) -> bool:
     """Draw a panel's map in a box (left, bottom, width, height), mm; say if it has shadow."""
-    panel = PANELS[letter]
-    layer = panel.layer(products, study)
-    title = f"{prefix}{panel.title}{' (map)' if letter == 'a' else ''}"
+    title = f"{prefix}{PANELS[letter].title}{' (map)' if letter == 'a' else ''}"
+    layer = PANELS[letter].layer(products, study)
+    axes = _draw(figure, box, layer, title, label_x=label_x, label_y=label_y)
+    return maps.outline_shadow(axes, products["truth"]["shadow"])
+
+
+def _draw(
+    figure: Figure,
+    box: tuple[float, float, float, float],
+    layer: Layer,
+    title: str,
+    *,
+    label_x: bool,
+    label_y: bool,
+) -> Axes:
+    """Draw a layer with its colour bar in a box (left, bottom, width, height), mm."""
     axes = maps.place(figure, layer.data, box, title)
     image = maps.draw(
         axes,
@@ -270,7 +346,7 @@ def _map(
         label_y=label_y,
     )
     maps.colorbar(axes, image, layer.label, extend=layer.extend, phase=layer.phase)
-    return maps.outline_shadow(axes, products["truth"]["shadow"])
+    return axes
 
 
 def _surface(

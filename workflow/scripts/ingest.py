@@ -1,0 +1,14 @@
+"""Read a file of the user's own and write the products that the chain takes from it."""
+
+from pathlib import Path
+
+from job import attributes, job, stage_of
+
+from vinsar import config, ingest, storage
+
+with job(snakemake):
+    study = config.Study.part(snakemake.params.configuration)
+    products = ingest.read(study)
+    for path in snakemake.output:
+        name = Path(path).stem
+        storage.write(products[name], path, name, attributes(snakemake, stage_of(snakemake, path)))
