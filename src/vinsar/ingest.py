@@ -181,7 +181,7 @@ def measurement(path: str) -> dict[str, xr.Dataset]:
     """
     with _blaming("measurement.file", path), _netcdf(path) as stored:
         frequency, (transmitter, receiver) = _waveform(stored)
-        parts = [_samples(stored, f"echo_{part}") for part in ("real", "imag")]
+        parts = [_samples(_by_name(stored), f"echo_{part}") for part in ("real", "imag")]
     echo = np.empty(parts[0].shape, np.result_type(*parts, np.complex64))
     echo.real, echo.imag = parts
     antennas = variables.dataset("trajectory", {"transmitter": transmitter, "receiver": receiver})
@@ -302,8 +302,19 @@ def _geotiff_heights(path: Path) -> xr.Dataset:
     return xr.Dataset(data, axes).sortby(["y", "x"])
 
 
+def _by_name(stored: xr.Dataset) -> xr.Dataset:
+    """Return a file whose labels lie along the dimensions of their names, not of an index."""
+    for name in ("channel", "axis"):
+        index = f"{name}_index"
+        if index in stored.dims and name not in stored.dims:
+            labelled = name in stored.variables
+            stored = (stored.swap_dims if labelled else stored.rename_dims)({index: name})
+    return stored
+
+
 def _waveform(stored: xr.Dataset) -> tuple[Floats, Antennas]:
     """Return frequencies and antenna positions, checked by themselves."""
+    stored = _by_name(stored)
     for part in ("real", "imag"):
         _declared(stored, f"echo_{part}", ("channel", "position", "frequency"), ())
     for name, labels in (("channel", CHANNELS), ("axis", AXES)):

@@ -52,12 +52,20 @@ def echo_file(products, tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def echoes(echo_file):
+    """What the file holds, with dimensions of the names that docs/own-data.md gives."""
+    with xr.open_dataset(echo_file) as data:
+        return data.load().swap_dims(channel_index="channel", axis_index="axis")
+
+
 def own_terrain(path, **scene):
     return ingest.check(tiny(scene={"terrain": "file", "file": str(path)} | scene))
 
 
 def own_echoes(path, **sections):
-    return ingest.check(tiny(measurement={"file": str(path)}, **sections))
+    own = {"measurement": {"file": str(path)}, "outputs": {"claims": False}}
+    return ingest.check(tiny(**own, **sections))
 
 
 def said(file, ask):
@@ -292,10 +300,20 @@ def test_a_simulated_echo_read_back_as_foreign_gives_the_same_dem(echo_file, stu
     assert not {"terrain", "facets", "truth", "accuracy"} & set(made)
 
 
-def test_a_measurement_of_another_radar_brings_its_own(echo_file, tmp_path):
+def test_labels_by_name_by_index_and_none_are_the_same(echo_file, echoes, tmp_path):
+    files = [echo_file, tmp_path / "named.nc", tmp_path / "turned.nc"]
+    echoes.to_netcdf(files[1])
+    turned = echoes.drop_vars(["channel", "axis"]).transpose(*reversed(echoes.dims))
+    turned.to_netcdf(files[2])
+    one, *others = (ingest.measurement(str(path)) for path in files)
+    for other in others:
+        for name in pipeline.MEASURED:
+            xr.testing.assert_identical(one[name], other[name])
+
+
+def test_a_measurement_of_another_radar_brings_its_own(echoes, tmp_path):
     path = tmp_path / "other.nc"
-    with xr.open_dataset(echo_file) as data:
-        other = data.isel(frequency=slice(20, 180), position=slice(2, 19)).load()
+    other = echoes.isel(frequency=slice(20, 180), position=slice(2, 19)).copy(deep=True)
     other["transmitter"][..., 2] += 0.4
     other["receiver"][1, :, 1] += 0.1
     other.to_netcdf(path)
@@ -358,19 +376,17 @@ def one_part(data):
     ],
 )  # fmt: skip
 def test_echoes_that_will_not_do_are_refused_before_anything_runs(
-    echo_file, tmp_path, change, sentence
+    echoes, tmp_path, change, sentence
 ):
     path = tmp_path / "bad.nc"
-    with xr.open_dataset(echo_file) as data:
-        change(data.load()).to_netcdf(path)
+    change(echoes).to_netcdf(path)
     assert sentence in said(path, lambda: own_echoes(path))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_samples_that_are_not_finite_are_refused(echo_file, tmp_path, value):
+def test_samples_that_are_not_finite_are_refused(echoes, tmp_path, value):
     path = tmp_path / "bad.nc"
-    with xr.open_dataset(echo_file) as data:
-        put("echo_imag", (1, 2, 3), value)(data.load()).to_netcdf(path)
+    put("echo_imag", (1, 2, 3), value)(echoes).to_netcdf(path)
     own = own_echoes(path)
     sentence = said(path, lambda: ingest.read(own))
     assert "'echo_imag' has 1 values" in sentence
