@@ -109,6 +109,16 @@ def test_a_study_without_results_reports_its_radar_alone() -> None:
     assert [part.name for part in found.sections] == ["radar"]
 
 
+def test_measured_echoes_are_reported_without_the_scene_that_they_do_not_have() -> None:
+    study = make_study(measurement={"file": "echo.nc"}, imaging={"y_min_m": 20.0, "y_max_m": 24.0})
+    found = report.build(sources(study))
+    assert found.subtitle.startswith("From measured echoes")
+    text = next(b for b in section(found, "radar").blocks[1:] if isinstance(b, content.Text))
+    assert "in the middle of the image at x = 0 m, y = 22 m" in text.text
+    shown = {name: value for name, value, _ in content.quantities(study)}
+    assert shown["slant range of the lower antenna, r1"] == f"{np.hypot(22, 2):.3f}"
+
+
 def test_derived_quantities_are_those_of_the_paper_s_equations() -> None:
     shown = {name: value for name, value, _ in content.quantities(make_study())}
     c, r1 = 299_792_458.0, np.hypot(13.0, 2.0)

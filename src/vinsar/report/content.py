@@ -307,7 +307,8 @@ def _radar(study: config.Study) -> Section:
     derived = Table(
         "derived", ("quantity", "value", "unit"), "lrl", (1, 0, 0), tuple(quantities(study))
     )
-    middle = baseline.view(study.radar, study.scene)
+    middle = _middle(study)
+    place = "image" if study.measurement.file is not None else "scene"
     return Section(
         "radar",
         "The radar",
@@ -315,12 +316,18 @@ def _radar(study: config.Study) -> Section:
             Text("The values of the paper's Table 1 and those that it leaves open."),
             given,
             Text(
-                f"What follows from them, in the middle of the scene at x = {middle.x_m:g} m, "
+                f"What follows from them, in the middle of the {place} at x = {middle.x_m:g} m, "
                 f"y = {middle.y_m:g} m on the ground:"
             ),
             derived,
         ),
     )
+
+
+def _middle(study: config.Study) -> baseline.View:
+    # Measured echoes come without a scene.
+    area: Any = study.imaging if study.measurement.file is not None else study.scene
+    return baseline.view(study.radar, area)
 
 
 def quantities(study: config.Study) -> list[tuple[str, str, str]]:
@@ -335,10 +342,10 @@ def quantities(study: config.Study) -> list[tuple[str, str, str]]:
     -------
     list of tuple of str
         Wavelength, resolutions, unambiguous range, and what the baseline means for coherence and
-        phase, in the middle of the scene.
+        phase, in the middle of the scene, or of the image where the echoes are measured.
     """
     options = study.radar
-    seen = baseline.view(options, study.scene)
+    seen = _middle(study)
     frequency = radar.frequencies(
         options.start_frequency_hz, options.stop_frequency_hz, options.frequency_count
     )
