@@ -158,6 +158,7 @@ def test_derived_quantities_are_those_of_the_paper_s_equations() -> None:
         ("snr_db", None, "none"),
         ("dwell_s", 1e-6, "1 µs"),
         ("objects", (), "none"),
+        ("objects", ({"x_m": 1.0, "on": True}, {"x_m": -2.0}), "x_m 1, on yes; x_m −2"),
         ("occlusion", True, "yes"),
         ("system", "rail", "rail"),
     ],

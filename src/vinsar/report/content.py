@@ -246,7 +246,8 @@ def _written(value: Any) -> str:
     if isinstance(value, (int, float)):
         return number(value)
     if isinstance(value, (list, tuple)):
-        return ", ".join(_written(item) for item in value) or "none"
+        gap = "; " if any(isinstance(item, (dict, list, tuple)) for item in value) else ", "
+        return gap.join(_written(item) for item in value) or "none"
     if isinstance(value, dict):
         return ", ".join(f"{key} {_written(item)}" for key, item in value.items()) or "none"
     return str(value)
