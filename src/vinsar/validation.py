@@ -873,8 +873,15 @@ def _sides_apart(
         part.y_min_m / part.x_max_m if part.x_max_m > 0 else np.inf for part in (scene, imaging)
     )
     speed = vehicle.forward_speed_m_per_s
-    if speed * vehicle.scan_duration_s / radar.aperture_length_m > most:
-        limit = most * radar.aperture_length_m / vehicle.scan_duration_s
+    lower = trajectory.apertures(
+        motion.advance(
+            trajectory.planned(radar), speed_m_per_s=speed, duration_s=vehicle.scan_duration_s
+        )
+    )[0]
+    # A transmitter that stands on the vehicle halves the way along x, and not that ahead.
+    along, ahead, _ = lower.transmitter_travel + lower.receiver_travel
+    if ahead > most * along:
+        limit = speed * most * along / ahead
         yield Fault(
             "vehicle.forward_speed_m_per_s",
             speed,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from vinsar import aperture, echo, imaging, motion, radar, registration, trajectory
+from vinsar import aperture, echo, imaging, motion, radar, registration, trajectory, validation
 
+PAPER = Path(__file__).parents[2] / "config/paper.yaml"
 LIGHT = 299_792_458.0
 FREQUENCY = radar.frequencies(13e9, 15e9, 201)
 WAVELENGTH = LIGHT / 14e9
@@ -117,3 +120,27 @@ def test_the_height_of_a_raised_target_is_inverted_from_its_image(
     place = aperture.locate(lower, upper, x, y, wrapped + flat + 2 * np.pi * cycles, WAVELENGTH)
     # A hundredth of a cycle of phase, of 0.47 m a cycle.
     np.testing.assert_allclose(np.array(place), target, atol=5e-3)
+
+
+@pytest.mark.parametrize("system", ["transmit_pair", "receive_pair"])
+@pytest.mark.parametrize("target", [(0.0, 13.0, 0.3), (-2.0, 11.0, -0.2)])
+def test_a_switched_array_on_a_moving_vehicle_inverts_the_height(image, system, target):
+    paper = validation.load(PAPER).radar
+    antennas = motion.advance(
+        trajectory.planned(paper.model_copy(update={"system": system})),
+        speed_m_per_s=10.0,
+        duration_s=0.03,
+    )
+    lower, upper = trajectory.apertures(antennas)
+    x, y = (float(value) for value in aperture.image_position(lower, *target))
+    found = image(target, antennas, antennas, np.array([x, x + 1]), np.array([y, y + 1]))[:, 0, 0]
+    assert np.abs(found[0]) == pytest.approx(1, abs=1.2e-3)
+    # The upper image of the target lies elsewhere by less than a tenth of a cell.
+    assert np.abs(found[1]) > 0.99
+    wrapped = np.angle(found[0] * np.conj(found[1]))
+    flat = aperture.flat_earth_phase(lower, upper, x, y, WAVELENGTH)
+    true = aperture.interferometric_phase(lower, upper, *target, WAVELENGTH)
+    cycles = np.round((true - flat - wrapped) / (2 * np.pi))
+    place = aperture.locate(lower, upper, x, y, wrapped + flat + 2 * np.pi * cycles, WAVELENGTH)
+    # A hundredth of a cycle of phase, of 0.93 m a cycle.
+    np.testing.assert_allclose(np.array(place), target, atol=1e-2)

@@ -249,6 +249,10 @@ def test_an_aperture_that_points_into_the_image_is_advised_against():
     (sentence,) = validation.advice(validation.check(changed(vehicle=vehicle)))
     # y / x = 10 / 2.5 in the near right corner, at a cart speed of 1.6 m/s.
     assert "apart up to 6.4 m/s" in sentence
+    # With a transmitter that stands, an array of the same length turns twice as fast.
+    array = changed(vehicle=vehicle, radar__system="receive_pair", outputs__claims=False)
+    array["outputs"]["figures"] = []
+    assert any("apart up to 3.2 m/s" in said for said in validation.advice(validation.check(array)))
     vehicle |= {"forward_speed_m_per_s": 6.3}
     assert validation.advice(validation.check(changed(vehicle=vehicle))) == []
 
