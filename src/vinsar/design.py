@@ -235,9 +235,9 @@ class Sheet:
         """Return the coherence that baseline, noise and position errors leave.
 
         White position errors that give the echoes phases of variance v leave ``exp(-v)`` of a
-        target's power in focus and spread the rest over the unambiguous width along x. Of it the
-        scene fills the share w; that comes from targets of other phases:
-        ``s / (s + (1 - s) w)`` with ``s = exp(-v)``.
+        target's power in focus and spread the rest evenly over all paths' growths from position to
+        position, which a wavelength of growth repeats. The scene fills the share w of it, with
+        targets of other phases: ``s / (s + (1 - s) w)`` is left, with ``s = exp(-v)``.
 
         Parameters
         ----------
@@ -253,8 +253,8 @@ class Sheet:
         """
         part = self.scene
         focused = np.exp(-(np.asarray(position_errors, float) ** 2))
-        width = np.array([self.unambiguous_width(float(at)) for at in np.ravel(y)])
-        filled = np.minimum(1, (part.x_max_m - part.x_min_m) / width).reshape(np.shape(y))
+        left, right = (self.growth(x, y) for x in (part.x_min_m, part.x_max_m))
+        filled = np.minimum(1, np.abs(right - left) / self.wavelength)
         return np.asarray(
             np.clip(1 - self.turns_per_cell(y), 0, 1)
             * baseline.noise_coherence(self.snr_db(y))
@@ -306,6 +306,19 @@ class Sheet:
         errors = position_std_m * self.phase_per_position(x, y, axis)
         return float(np.sqrt(np.mean(self.height_std(y, errors) ** 2)))
 
+    def growth(self, x: float, y: ArrayLike) -> Floats:
+        """Return by how much the path grows from one position to the next, in the mean, m."""
+        y = np.asarray(y, float)
+        target = np.stack(np.broadcast_arrays(x, y, 0.0), axis=-1)
+        first, last = (
+            sum(
+                np.linalg.norm(target - self.antennas[end].values[0, number], axis=-1)
+                for end in ("transmitter", "receiver")
+            )
+            for number in (0, -1)
+        )
+        return np.asarray(last - first) / (self.antennas.sizes["position"] - 1)
+
     def unambiguous_width(self, y: float) -> float:
         """Return the width along x that the spacing of the positions images once, m.
 
@@ -314,14 +327,11 @@ class Sheet:
         """
         from scipy.optimize import brentq
 
-        ends = [self.antennas[name].values[0] for name in ("transmitter", "receiver")]
         shortest = radar.wavelength(float(self.frequency[-1]))
 
         def excess(width: float) -> float:
-            points = np.array([[self.x - width / 2, y, 0.0], [self.x + width / 2, y, 0.0]])
-            path = sum(np.linalg.norm(points[:, None] - end, axis=-1) for end in ends)
-            growth = np.diff(path, axis=-1).mean(axis=-1)
-            return float(abs(growth[0] - growth[1])) - shortest
+            left, right = (self.growth(self.x + side * width / 2, y) for side in (-1, 1))
+            return float(abs(right - left)) - shortest
 
         widest = 1e4
         return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
@@ -485,20 +495,22 @@ class Sheet:
         return float(brentq(excess, 0.0, largest)) if excess(largest) > 0 else math.inf
 
     def coupling_db(self) -> float | None:
-        """Return the coupling's sidelobes at the image's near edge over the scene, dB.
+        """Return the coupling's strongest sidelobes in the image over the scene, dB.
 
-        By the envelope ``cell / (pi range)`` of a rectangular window's sidelobes; None where there
-        is no coupling, or something is done about it.
+        By the envelope of a rectangular window's sidelobes, ``1 / (N sin(pi r / R))`` for N
+        frequencies and the unambiguous range R; None where there is no coupling, or something is
+        done about it.
         """
-        level, near = self.study.echo.coupling_db, float(self.slant_range(self.places[0]))
+        level = self.study.echo.coupling_db
         if (
             level is None
             or self.study.suppression.method != "none"
             or self.study.imaging.range_window != "rectangular"
         ):
             return None
-        apart = near - self.study.echo.coupling_path_m / 2
-        return level - 20 * math.log10(math.pi * apart / self.range_resolution)
+        ends = np.array([float(self.slant_range(self.places[0])), self.farthest_range])
+        turn = np.pi * (ends - self.study.echo.coupling_path_m / 2) / self.unambiguous_range
+        return level - 20 * math.log10(self.frequency.size * float(np.abs(np.sin(turn)).min()))
 
     def warnings(self) -> list[str]:
         """Return what is unwise, a sentence each, in the order of the chain.
@@ -531,7 +543,7 @@ class Sheet:
         if sidelobes is not None and sidelobes > _SIDELOBES_DB:
             found.append(
                 f"echo.coupling_db = {self.study.echo.coupling_db}: its sidelobes are "
-                f"{sidelobes:+.0f} dB against the scene at the image's near edge; take a "
+                f"{sidelobes:+.0f} dB against the scene in the image; take a "
                 "suppression.method or an imaging.range_window"
             )
         std, most = self.height_std(y), self.study.accuracy.tolerance_m / OF_95_PERCENT

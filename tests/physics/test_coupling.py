@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.special import fresnel
 
-from vinsar import echo, imaging, radar, suppression, trajectory, variables
+from vinsar import (
+    echo,
+    imaging,
+    pipeline,
+    radar,
+    suppression,
+    trajectory,
+    validation,
+    variables,
+)
+
+CONFIG = Path(__file__).parents[2] / "config"
 
 LIGHT = 299_792_458.0
 FREQUENCY = radar.frequencies(13e9, 15e9, 401)
@@ -104,3 +117,45 @@ def test_a_switched_array_s_coupling_is_not_common_to_its_positions(rail):
     samples = received_coupling(array, None)
     assert left_db(samples, "common") > -3
     assert left_db(samples, "gate") < -100
+
+
+@pytest.fixture(scope="module")
+def shown():
+    """What the coupling's study shows, on a small scene."""
+    raw = validation.merge(
+        validation.load(CONFIG / "paper.yaml", CONFIG / "smoke.yaml").model_dump(mode="json"),
+        {"echo": {"coupling_db": 60.0, "accuracy_db": -85.0}, "variants": {}, "sweeps": {}},
+    )
+    return pipeline.run(validation.check(raw), only="coupling")["coupling"]
+
+
+def test_the_coupling_stands_at_half_its_path_as_high_as_asked(shown):
+    power = shown["power"].sel(weighting="rectangular", suppression="none")
+    peak = power.isel(slant_range=int(np.argmax(power.values)))
+    assert float(peak["slant_range"]) == pytest.approx(0.2, abs=0.01)
+    # The scene's swath, of the coupling's level, is somewhat longer than the image's.
+    assert 10 * np.log10(float(peak)) == pytest.approx(60.0, abs=1.0)
+
+
+def test_sidelobes_bury_the_scene_until_they_are_suppressed(shown):
+    scene = shown["scene_power"]
+    within = (scene["slant_range"] > 10.5) & (scene["slant_range"] < 13.0)
+    power = shown["power"].where(within, drop=True).mean("slant_range")
+    clean = float(scene.where(within, drop=True).mean())
+    buried = float(power.sel(weighting="rectangular", suppression="none"))
+    # Lobes 1 / (N sin(pi r / R)) in amplitude, of half their envelope's power in the mean.
+    ranges = scene["slant_range"].where(within, drop=True).values
+    lobes = 1 / (201 * np.sin(np.pi * (ranges - 0.2) / radar.unambiguous_range(1e7)))
+    expected = 60 + 10 * np.log10(np.mean(lobes**2) / 2)
+    assert 10 * np.log10(buried - clean) == pytest.approx(expected, abs=1.0)
+    assert float(power.sel(weighting="hann", suppression="none")) < 2 * clean
+    for method in ("gate", "common", "both"):
+        left = float(power.sel(weighting="rectangular", suppression=method))
+        assert left == pytest.approx(clean, rel=0.1), method
+
+
+def test_imaged_targets_lose_the_share_that_is_common(shown):
+    image = shown["point_image"]
+    assert np.abs(image.sel(suppression="none") - 1).max() < 1.2e-2
+    left = np.abs(image.sel(suppression="common"))
+    assert np.abs(left - (1 - shown["common_share"])).max() < 0.02

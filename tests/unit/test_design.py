@@ -178,7 +178,7 @@ def test_tolerated_errors_meet_the_tolerance():
         ({"radar": {"frequency_count": 225}}, "unambiguous range"),
         ({"radar": {"position_spacing_m": 0.8 / 44}}, "imaged once"),
         ({"imaging": {"grid_spacing_m": 0.05}}, "undersampled"),
-        ({"echo": {"coupling_db": 60.0}}, "sidelobes are +8 dB"),
+        ({"echo": {"coupling_db": 60.0}}, "sidelobes are +9 dB"),
         ({"echo": {"snr_db": 0.0}}, "fewer than 95 %"),
         ({"radar": {"baseline_m": 1.0}}, "less than half the relief"),
         ({"radar": {"rail_height_m": 0.25}}, "hides all that lies behind it"),
