@@ -21,12 +21,12 @@ from rocrate.rocrate import ROCrate
 
 import vinsar
 from vinsar import config, lineage, provenance, storage
+from vinsar.lineage import SOURCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
 METADATA = "ro-crate-metadata.json"
-SOURCE = "source"
 CONFIGURATION = "configuration.yaml"
 _WORKFLOW = f"{SOURCE}/Snakefile"
 
@@ -94,13 +94,15 @@ def write(folder: str | Path, study: config.Study, *, agent: str = "") -> Path:
     """
     folder = Path(folder)
     _refuse_unsound(folder, study)
+    records = lineage.read_records(folder)
+    own = {name: _place(path) for name, path in lineage.own_files(folder, records).items()}
     jobs: _Jobs = {}
-    for _, record in sorted(lineage.read_records(folder).items()):
+    for _, record in sorted(records.items()):
         jobs.setdefault(record["job"], []).append(record)
-    _copy_sources(folder)
+    _copy_sources(folder, own)
     with storage.atomic(folder / CONFIGURATION) as path:
         path.write_text(_as_yaml(study), encoding="utf-8")
-    described = _Description(folder, study, jobs, agent).document()
+    described = _Description(folder, study, jobs, own, agent).document()
     with storage.atomic(folder / METADATA) as path:
         text = json.dumps(described, indent=2, sort_keys=True, ensure_ascii=False)
         path.write_text(text + "\n", encoding="utf-8")
@@ -135,10 +137,16 @@ def _refuse_unsound(folder: Path, study: config.Study) -> None:
         )
 
 
-def _copy_sources(folder: Path) -> None:
+def _place(path: Path) -> str:
+    """Return where a file of the user's own lies in the crate: where the sources look for it."""
+    return f"{SOURCE}/own/{path.name}" if path.is_absolute() else f"{SOURCE}/{path.as_posix()}"
+
+
+def _copy_sources(folder: Path, own: Mapping[str, str]) -> None:
     shutil.rmtree(folder / SOURCE, ignore_errors=True)
-    for path in provenance.workflow_files():
-        target = folder / SOURCE / path
+    copies = {folder / SOURCE / path: path for path in provenance.workflow_files()}
+    copies |= {folder / place: folder / name for name, place in own.items()}
+    for target, path in copies.items():
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, target)
 
@@ -183,8 +191,15 @@ def _entry(name: str, mode: int) -> zipfile.ZipInfo:
 class _Description:
     """The crate's entities, from the study's records."""
 
-    def __init__(self, folder: Path, study: config.Study, jobs: _Jobs, agent: str) -> None:
-        self.folder, self.study, self.jobs = folder, study, jobs
+    def __init__(
+        self,
+        folder: Path,
+        study: config.Study,
+        jobs: _Jobs,
+        own: Mapping[str, str],
+        agent: str,
+    ) -> None:
+        self.folder, self.study, self.jobs, self.own = folder, study, jobs, own
         self.crate = ROCrate(version="1.1")
         self.records = [record for records in jobs.values() for record in records]
         self.started = min(record["started"] for record in self.records)
@@ -203,15 +218,19 @@ class _Description:
         """Return the metadata document."""
         self._folders()
         outputs = {record["file"]: self._output(record) for record in self.records}
+        given = {
+            name: self._parameter(name, "File", "a file of the user's own", self.files[place])
+            for name, place in self.own.items()
+        }
         values = {job: self._values(job) for job in self.jobs}
         rules = sorted({records[0]["rule"] for records in self.jobs.values()}, key=self._depth)
-        tools = {rule: self._tool(rule, outputs, values) for rule in rules}
+        tools = {rule: self._tool(rule, outputs | given, values) for rule in rules}
         configuration = self._parameter(
             "configuration", "File", "the study's whole configuration", self.files[CONFIGURATION]
         )
         workflow = self._workflow(
             tools,
-            inputs=[configuration, *self.parameters.values()],
+            inputs=[configuration, *given.values(), *self.parameters.values()],
             outputs=list(outputs.values()),
         )
         steps = {}
@@ -240,7 +259,11 @@ class _Description:
             name=f"the study '{self.study.study}'",
             description=f"all results of {self.study.study}, from the first job to the last",
             instrument=workflow,
-            object=[self.files[CONFIGURATION], *_distinct(values.values())],
+            object=[
+                self.files[CONFIGURATION],
+                *(self.files[place] for place in self.own.values()),
+                *_distinct(values.values()),
+            ],
             result=[self.files[record["file"]] for record in self.records],
             started=self.started,
             ended=self.ended,
@@ -342,7 +365,7 @@ class _Description:
             found.append(self.crate.dereference(f"#value/{name}"))
         return found
 
-    def _tool(self, rule: str, outputs: Mapping[str, Any], values: Mapping[str, list[Any]]) -> Any:
+    def _tool(self, rule: str, files: Mapping[str, Any], values: Mapping[str, list[Any]]) -> Any:
         jobs = [job for job, records in self.jobs.items() if records[0]["rule"] == rule]
         records = [record for job in jobs for record in self.jobs[job]]
         attributes = records[0]["provenance"]
@@ -355,8 +378,8 @@ class _Description:
             name=f"vinsar {rule}",
             version=vinsar.__version__,
             softwareVersion=f"{attributes['source']}, commit {attributes['vinsar_commit']}",
-            input=[*(outputs[name] for name in read), *given],
-            output=[outputs[record["file"]] for record in records],
+            input=[*(files[name] for name in read), *given],
+            output=[files[record["file"]] for record in records],
             hasPart=[self.files[f"{SOURCE}/{name}"] for name in code],
             softwareRequirements=list(self.software.values()),
         )
@@ -392,7 +415,7 @@ class _Description:
             name=job,
             description=f"on {_cores(records[0]['threads'])} of {records[0]['platform']}",
             instrument=tools[records[0]["rule"]],
-            object=[*(self.files[name] for name in read), *values],
+            object=[*(self.files[self.own.get(name, name)] for name in read), *values],
             result=[self.files[record["file"]] for record in records],
             started=min(record["started"] for record in records),
             ended=max(record["ended"] for record in records),
@@ -414,9 +437,8 @@ class _Description:
         made_by = {record["file"]: record for record in self.records}
 
         def below(name: str) -> int:
-            return max(
-                (1 + below(source) for source in made_by[name]["inputs"].values()), default=0
-            )
+            sources = set(made_by[name]["inputs"].values()) - set(self.own)
+            return max((1 + below(source) for source in sources), default=0)
 
         return max(below(record["file"]) for record in self.records if record["rule"] == rule), rule
 

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from vinsar import config
 
 RECORDS = "records"
+# What `crate` copies into a study's folder, to be handed on with it.
+SOURCE = "source"
 
 Records = dict[str, dict[str, Any]]
 
@@ -109,6 +111,32 @@ def read_records(folder: str | Path) -> Records:
             found[record["file"]] = record
         except (ValueError, KeyError, TypeError) as error:
             raise ValueError(f"{path} is no record of a result ({error}); delete it") from error
+    return found
+
+
+def own_files(folder: str | Path, records: Records) -> dict[str, Path]:
+    """Return the files of the user's own that a study was made from.
+
+    Parameters
+    ----------
+    folder
+        The study's folder.
+    records
+        Its records, as `read_records` gives them.
+
+    Returns
+    -------
+    dict of Path
+        By the names that they have in the records: paths from the working folder, or absolute ones
+        if they lie outside of it.
+    """
+    found = {}
+    for record in records.values():
+        for name in record["inputs"].values():
+            if name.startswith("../"):
+                path = (Path(folder) / name).resolve()
+                inside = path.is_relative_to(Path.cwd())
+                found[name] = path.relative_to(Path.cwd()) if inside else path
     return found
 
 
@@ -408,6 +436,8 @@ def verify(folder: str | Path, study: config.Study | None = None) -> dict[str, l
         found[name] = problems
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
+        if name.startswith(f"{SOURCE}/"):
+            continue
         ours = path.suffix in {".nc", ".png", ".pdf", ".svg"} and not path.name.startswith(".")
         if ours and path.is_file() and name not in records:
             found[name] = ["there is no record of its making"]

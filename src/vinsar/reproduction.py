@@ -99,6 +99,10 @@ def reproduce(
     verdict = None
     try:
         _check_out(_commit(folder, records), place)
+        for own in lineage.own_files(folder, records).values():
+            if not own.is_absolute() and not (place / own).exists():
+                (place / own).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(own, place / own)
         _run(place, [f"results/{folder.name}/{name}" for name in records], configuration, now)
         fresh = place / "results" / folder.name
         differing = [
