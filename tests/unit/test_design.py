@@ -230,3 +230,9 @@ def test_the_sheet_of_the_paper_names_its_figures():
 )
 def test_the_relief_is_the_highest_thing_declared(scene, relief):
     assert sheet_of(scene=scene).relief == relief
+
+
+def test_where_echoes_are_measured_the_image_stands_for_the_scene():
+    measured = sheet_of(measurement={"file": "echo.nc"}, scene={"x_max_m": 4.0, "y_max_m": 20.0})
+    assert measured.scene is measured.study.imaging
+    assert measured.farthest_range == sheet_of().farthest_range
