@@ -21,7 +21,7 @@ FIGURE_RULES = {
     "figure_fig4", "figure_baseline_angle", *OF_SWEEPS,
 }  # fmt: skip
 AFTER_FILTERING = {
-    "filtered", "unwrapped", "dem", "accuracy", "accuracy_summary", "claims",
+    "filtered", "unwrapped", "dem", "detections", "accuracy", "accuracy_summary", "claims",
     "figure_summary", "figure_fig3", "figure_fig3_panels", "figure_fig4", "sweep", *OF_SWEEPS,
 }  # fmt: skip
 
