@@ -259,7 +259,7 @@ def trace(path: str | Path, study: config.Study | None = None) -> Origin:
     ValueError
         If the file is missing or carries no provenance.
     """
-    return _trace(Path(path), _study_folder(Path(path)), study, None)
+    return _trace(Path(path), _study_folder(Path(path)), study, None, {})
 
 
 def _study_folder(path: Path) -> Path:
@@ -269,7 +269,26 @@ def _study_folder(path: Path) -> Path:
     raise ValueError(f"{path} is in no study's folder: there are no {RECORDS} above it")
 
 
-def _trace(path: Path, folder: Path, study: config.Study | None, expected: str | None) -> Origin:
+def _trace(
+    path: Path,
+    folder: Path,
+    study: config.Study | None,
+    expected: str | None,
+    known: dict[tuple[Path, str | None], Origin],
+) -> Origin:
+    """Trace a result once, however many others were made from it."""
+    if (path, expected) not in known:
+        known[path, expected] = _traced(path, folder, study, expected, known)
+    return known[path, expected]
+
+
+def _traced(
+    path: Path,
+    folder: Path,
+    study: config.Study | None,
+    expected: str | None,
+    known: dict[tuple[Path, str | None], Origin],
+) -> Origin:
     if not path.is_file():
         return Origin(path, {}, ["missing"])
     record = _record(path, folder)
@@ -296,7 +315,7 @@ def _trace(path: Path, folder: Path, study: config.Study | None, expected: str |
         if source.startswith("../"):
             origin.inputs.append(_own_file(folder / source, sha))
         else:
-            origin.inputs.append(_trace(folder / source, folder, study, sha))
+            origin.inputs.append(_trace(folder / source, folder, study, sha, known))
     return origin
 
 

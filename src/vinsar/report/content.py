@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import baseline, config, pipeline, radar, trajectory
+from vinsar import baseline, config, lineage, pipeline, radar, trajectory
 from vinsar.figures import FIGURES, height_error, sweeps, thumbnails
 
 if TYPE_CHECKING:
@@ -375,20 +375,11 @@ def quantities(study: config.Study) -> list[tuple[str, str, str]]:
     ]
 
 
-def leaves(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield each key of a nested configuration, dotted, with its value; lists are values."""
-    if isinstance(value, dict) and value:
-        for key, inner in value.items():
-            yield from leaves(inner, f"{prefix}.{key}" if prefix else str(key))
-    elif prefix:
-        yield prefix, value
-
-
 def _changes(sources: Sources) -> Section | None:
-    paper = dict(leaves(dict(sources.paper)))
+    paper = dict(lineage.leaves(dict(sources.paper)))
     skipped = ("study", "outputs.", "sweeps.", "figures.")
     rows = []
-    for key, value in leaves(sources.study.values(SECTIONS)):
+    for key, value in lineage.leaves(sources.study.values(SECTIONS)):
         if key.startswith(skipped) or value == paper.get(key, value):
             continue
         rows.append((f"`{key}`", with_unit(key, paper.get(key)), with_unit(key, value)))
