@@ -58,6 +58,10 @@ def test_exported_echoes_give_the_same_heights_and_nothing_that_needs_truth(chec
     assert not (made.results / "accuracy.json").exists()
     verified = ask(made.folder, "verify", "results/tiny", "--configfile", "tiny.yaml", "extra.yaml")
     assert verified.returncode == 0, verified.stdout + verified.stderr
+    packed = ask(made.folder, "crate", "results/tiny", "--configfile", "tiny.yaml", "extra.yaml")
+    assert packed.returncode == 0, packed.stdout + packed.stderr
+    copied = made.results / "source/echo.nc"
+    assert copied.read_bytes() == (made.folder / "echo.nc").read_bytes()
     refused = made.snakemake("-n", "results/tiny/accuracy.json", extra=ECHOES)
     assert refused.returncode != 0
     assert "There is no 'accuracy' in the study 'tiny'" in refused.stdout + refused.stderr
