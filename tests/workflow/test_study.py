@@ -154,6 +154,12 @@ def test_a_rail_height_reruns_no_facet(checkout):
     assert not {"terrain", "facets"} & rules
 
 
+def test_a_speed_of_the_vehicle_reruns_no_facet(checkout):
+    rules = checkout.would_run("vehicle: {forward_speed_m_per_s: 1.0}\n")
+    assert {"true_trajectory", "truth", "echo", "profiles", "focus"} <= rules
+    assert not {"terrain", "facets", "trajectory", "registration"} & rules
+
+
 def test_a_truncated_product_is_named_with_what_to_do(checkout):
     path = checkout.results / "interferogram.nc"
     whole = path.read_bytes()
