@@ -27,7 +27,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def products(study):
-    return pipeline.run(study)
+    return pipeline.run(study, only="dem")
 
 
 def stored(products, name, folder):
@@ -298,6 +298,25 @@ def test_a_simulated_echo_read_back_as_foreign_gives_the_same_dem(echo_file, stu
     made = pipeline.run(own, only="dem", given=ingest.read(own))
     xr.testing.assert_identical(made["dem"], products["dem"])
     assert not {"terrain", "facets", "truth", "accuracy"} & set(made)
+
+
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"radar": {"system": "transmit_pair", "aperture_length_m": 1.2}},
+        {"vehicle": {"forward_speed_m_per_s": 2.0, "scan_duration_s": 0.5}},
+        {"motion": {"level_wavelengths": 0.05}},
+    ],
+)
+def test_other_apertures_come_back_as_well(tmp_path, sections):
+    study = validation.check(tiny(outputs={"claims": False}, **sections))
+    products = pipeline.run(study, only="dem")
+    for name in ("received", "recorded_trajectory"):
+        stored(products, name, tmp_path)
+    ingest.export(tmp_path, tmp_path / "echo.nc")
+    own = own_echoes(tmp_path / "echo.nc")
+    made = pipeline.run(own, only="dem", given=ingest.read(own))
+    xr.testing.assert_identical(made["dem"], products["dem"])
 
 
 def test_labels_by_name_by_index_and_none_are_the_same(echo_file, echoes, tmp_path):
