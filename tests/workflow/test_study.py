@@ -12,13 +12,10 @@ import xarray as xr
 from vinsar import accuracy, claims, figures, pipeline, storage, validation
 
 ROOT = Path(__file__).parents[2]
-OF_SWEEPS = {
-    "figure_fig5", "figure_baseline_length", "figure_baseline_vibration", "figure_snr",
-    "figure_design_check",
-}  # fmt: skip
+OF_SWEEPS = {"figure_fig5", "figure_snr"}
 FIGURE_RULES = {
     "figure_summary", "figure_fig1", "figure_fig2", "figure_fig3", "figure_fig3_panels",
-    "figure_fig4", "figure_baseline_angle", *OF_SWEEPS,
+    "figure_fig4", *OF_SWEEPS,
 }  # fmt: skip
 AFTER_FILTERING = {
     "filtered", "unwrapped", "dem", "detections", "accuracy", "accuracy_summary", "claims",
@@ -40,7 +37,8 @@ def products(study):
 def sweeps(checkout, study):
     return {
         f"sweeps/{name}": storage.read(checkout.results / f"sweeps/{name}.nc", "sweep")
-        for name in study.sweeps
+        for figure in study.outputs.figures
+        for name in figures.FIGURES[figure].sweeps
     }
 
 
