@@ -145,11 +145,8 @@ class Sheet:
 
     @property
     def scan_duration(self) -> float:
-        """Duration of a scan, s: the cart's on a rail, the dwell on all samples of an array."""
-        part = self.study.radar
-        if part.system == "rail":
-            return self.study.vehicle.scan_duration_s
-        return self.samples * part.dwell_s
+        """Duration of a scan, s."""
+        return trajectory.scan_duration(self.study.radar, self.study.vehicle, self.samples)
 
     @property
     def scene(self) -> config.Scene | config.Imaging:

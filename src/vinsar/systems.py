@@ -77,10 +77,7 @@ def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
         across, ahead = radar.ground_resolution(lower, *middle, frequency=frequency)
         wavelength = radar.wavelength(radar.carrier(frequency))
         positions = round(radar_.aperture_length_m / radar_.position_spacing_m) + 1
-        # ASSUME: An array has one receiver, which is switched from element to element; a cart
-        # measures both channels as it passes. A microsecond for each frequency.
-        sweeps = len(CHANNELS) * positions * radar_.frequency_count
-        rail = radar_.system == "rail"
+        samples = len(CHANNELS) * positions * radar_.frequency_count
         found.append(
             System(
                 name=f"{_NAMES[radar_.system]}, {radar_.aperture_length_m:g} m",
@@ -89,7 +86,7 @@ def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
                 height_of_ambiguity_m=float(
                     aperture.height_of_ambiguity(lower, upper, *middle, wavelength)
                 ),
-                scan_time_s=study.vehicle.scan_duration_s if rail else sweeps * radar_.dwell_s,
+                scan_time_s=trajectory.scan_duration(radar_, study.vehicle, samples),
                 accuracy=statistics.isel(radar=number),
             )
         )

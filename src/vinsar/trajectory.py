@@ -144,6 +144,21 @@ def switched_array(
     )
 
 
+def scan_duration(radar: config.Radar, vehicle: config.Vehicle, samples: int) -> float:
+    """Return the duration of a scan, s: the cart's on a rail, the dwell on all samples of an array.
+
+    Parameters
+    ----------
+    radar, vehicle
+        Sections of the configuration.
+    samples
+        Samples of a scan: channels x positions x frequencies.
+    """
+    # ASSUME: An array has one receiver, which is switched from element to element; a cart
+    # measures both channels as it passes. A microsecond for each frequency.
+    return vehicle.scan_duration_s if radar.system == "rail" else samples * radar.dwell_s
+
+
 def _line(length_m: float, spacing_m: float, height_m: float) -> NDArray[np.floating]:
     x = geometry.grid_axis(-length_m / 2, length_m / 2, spacing_m)
     return np.stack([x, np.zeros(x.size), np.full(x.size, height_m)], axis=-1)
