@@ -19,15 +19,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.floating]
 
-# A normal distribution's standard deviation by its median absolute deviation.
-_NORMAL = 1.4826
 # Lengths whose spread is within this share of the best one's are as good: chance decides there.
 _AS_GOOD = 0.1
 _BEST_COLOUR = "#dcebdd"
-
-_WHOLE = sweeps.Look("std, whole scene", style.INK, "-", "o")
-_VISIBLE = sweeps.Look("std, visible ground", style.BLUE, (0, (4, 1.5)), "s")
-_CORE = sweeps.Look("1.48 MAD, visible ground", style.ORANGE, (0, (4, 1.2, 1, 1.2)), "^")
 
 
 def _log_x(axes: Axes, limits: tuple[float, float]) -> None:
@@ -128,9 +122,9 @@ def draw_length(products: Products, study: config.Study) -> Figure:
 def _spreads(axes: Axes, sweep: xr.Dataset, at: Floats) -> Floats:
     """Draw the three spreads of the height error, cm, and return their ends."""
     parts = (
-        (sweep["std"].sel(region="whole_scene"), _WHOLE, 100.0),
-        (sweep["std"].sel(region="visible_ground"), _VISIBLE, 100.0),
-        (sweep["mad"].sel(region="visible_ground"), _CORE, 100.0 * _NORMAL),
+        (sweep["std"].sel(region="whole_scene"), sweeps.WHOLE, 100.0),
+        (sweep["std"].sel(region="visible_ground"), sweeps.VISIBLE, 100.0),
+        (sweep["mad"].sel(region="visible_ground"), sweeps.CORE, 100.0 * sweeps.NORMAL),
     )
     for data, look, scale in parts:
         sweeps.curve(axes, at, data, look, scale=scale)

@@ -12,21 +12,10 @@ if TYPE_CHECKING:
 
     from vinsar.pipeline import Products
 
-_NORMAL = 1.4826
 _PARTS = (
-    ("std", "whole_scene", 1.0, sweeps.Look("std, whole scene", style.INK, "-", "o")),
-    (
-        "std",
-        "visible_ground",
-        1.0,
-        sweeps.Look("std, visible ground", style.BLUE, (0, (4, 1.5)), "s"),
-    ),
-    (
-        "mad",
-        "visible_ground",
-        _NORMAL,
-        sweeps.Look("1.48 MAD, visible ground", style.ORANGE, (0, (4, 1.2, 1, 1.2)), "^"),
-    ),
+    ("std", "whole_scene", 1.0, sweeps.WHOLE),
+    ("std", "visible_ground", 1.0, sweeps.VISIBLE),
+    ("mad", "visible_ground", sweeps.NORMAL, sweeps.CORE),
 )
 
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.floating]
 
-_NORMAL = 1.4826
 _ROWS = 61
 _LEVELS = np.geomspace(4e-3, 1.0, 61)
 _DASHED, _DOTTED, _BROKEN = (0, (4, 1.5)), (0, (1, 1.2)), (0, (4, 1.2, 1, 1.2))
@@ -224,7 +223,7 @@ def _changed(parts: dict[str, Any], **changes: dict[str, Any]) -> design.Sheet:
 
 def _spread(sweep: Any) -> Floats:
     measured = sweep["mad"].sel(region="visible_ground").mean("realization")
-    return np.asarray(_NORMAL * measured.values)
+    return np.asarray(sweeps.NORMAL * measured.values)
 
 
 def _by_noise(products: Products, study: config.Study) -> tuple[Floats, Floats]:

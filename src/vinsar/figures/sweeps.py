@@ -33,6 +33,14 @@ class Look:
     marker: str
 
 
+# A normal distribution's standard deviation by its median absolute deviation.
+NORMAL = 1.4826
+
+WHOLE = Look("std, whole scene", style.INK, "-", "o")
+VISIBLE = Look("std, visible ground", style.BLUE, (0, (4, 1.5)), "s")
+CORE = Look("1.48 MAD, visible ground", style.ORANGE, (0, (4, 1.2, 1, 1.2)), "^")
+
+
 def spread(data: xr.DataArray) -> tuple[Floats, Floats, Floats]:
     """Return mean, 10th and 90th percentile over the realizations.
 
