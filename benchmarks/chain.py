@@ -8,7 +8,8 @@ from pathlib import Path
 import dask
 import numpy as np
 
-from vinsar import blocks, config, pipeline, validation
+from vinsar.foundations import blocks
+from vinsar.study import config, pipeline, validation
 
 ROOT = Path(__file__).parents[1]
 FRAME = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")

@@ -6,10 +6,13 @@ import numpy as np
 
 from benchmarks import contenders
 from benchmarks.timing import interleaved, summary
-from vinsar import blocks, echo, imaging, radar, scene, trajectory, variables, visibility
-from vinsar.constants import SPEED_OF_LIGHT
+from vinsar.foundations import blocks, variables
+from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.processing import focusing
+from vinsar.radar import trajectory, waveform
+from vinsar.simulation import echo, scene, visibility
 
-FREQUENCY = radar.frequencies(13e9, 15e9, 401)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 401)
 RAIL = trajectory.rail(
     aperture_length_m=0.8,
     position_spacing_m=0.01,
@@ -60,7 +63,7 @@ def backprojection(rounds, size=512, pixel=0.01):
     near, far = trajectory.range_extent(LOWER, x, y)
 
     def profiles(oversampling, interpolation):
-        return imaging.compress(
+        return focusing.compress(
             signal,
             near_range_m=near,
             far_range_m=far,
@@ -74,7 +77,7 @@ def backprojection(rounds, size=512, pixel=0.01):
 
     def ours(oversampling, interpolation, antennas=LOWER):
         made = profiles(oversampling, interpolation)
-        return imaging.backproject(made, antennas, x=x, y=y)["image"].values[0]
+        return focusing.backproject(made, antennas, x=x, y=y)["image"].values[0]
 
     given = profiles(16, "linear")
     slant = given["slant_range"].values
@@ -82,7 +85,7 @@ def backprojection(rounds, size=512, pixel=0.01):
         given["profile"].values[0] / len(ANTENNAS),
         slant[0],
         (slant[-1] - slant[0]) / (slant.size - 1),
-        2 * radar.carrier(FREQUENCY) / SPEED_OF_LIGHT,
+        2 * waveform.carrier(FREQUENCY) / SPEED_OF_LIGHT,
         ANTENNAS,
         x,
         y,

@@ -94,11 +94,14 @@ def main(case):
 def compute(case):
     """Return a function that computes the case; its inputs are made here."""
     from benchmarks.kernels import facets
-    from vinsar import echo, imaging, radar, trajectory, variables
+    from vinsar.foundations import variables
+    from vinsar.processing import focusing
+    from vinsar.radar import trajectory, waveform
+    from vinsar.simulation import echo
 
     large = case["kind"] == "large"
     count = case.get("positions", 321 if large else 81)
-    frequency = radar.frequencies(13e9, 15e9, case.get("frequencies", 801 if large else 401))
+    frequency = waveform.frequencies(13e9, 15e9, case.get("frequencies", 801 if large else 401))
     rail = trajectory.rail(
         aperture_length_m=0.01 * (count - 1), position_spacing_m=0.01, rail_height_m=2.0,
         baseline_m=0.3, baseline_angle_deg=90.0,
@@ -120,7 +123,7 @@ def compute(case):
     if case["kind"] == "profiles":
 
         def work():
-            imaging.compress(signal, near_range_m=10.0, far_range_m=17.0)
+            focusing.compress(signal, near_range_m=10.0, far_range_m=17.0)
 
         return work
     if large and not case.get("small"):
@@ -133,9 +136,9 @@ def compute(case):
     def work():
         near, far = trajectory.range_extent(rail, x, y)
         begin = time.perf_counter()
-        profiles = imaging.compress(signal, near_range_m=near, far_range_m=far)
+        profiles = focusing.compress(signal, near_range_m=near, far_range_m=far)
         compressed = time.perf_counter() - begin
-        imaging.backproject(profiles, rail, x=x, y=y)
+        focusing.backproject(profiles, rail, x=x, y=y)
         return {"compress_s": compressed, "pixel_positions": 2 * x.size * y.size * count}
 
     return work

@@ -12,7 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from vinsar import cluster, config, sweep, validation
+from vinsar.study import config, validation
+from vinsar.sweeps import cluster, sweep
 
 ROOT = Path(__file__).parents[1]
 

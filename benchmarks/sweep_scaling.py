@@ -11,7 +11,8 @@ import argparse
 import time
 from pathlib import Path
 
-from vinsar import cluster, sweep, validation
+from vinsar.study import validation
+from vinsar.sweeps import cluster, sweep
 
 ROOT = Path(__file__).parents[1]
 KINDS = [(kind, count) for kind in ("threads", "processes") for count in (1, 2)]

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from vinsar import echo, imaging, trajectory, variables
+from vinsar.foundations import variables
+from vinsar.processing import focusing
+from vinsar.radar import trajectory
+from vinsar.simulation import echo
 
 settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=60)
 settings.load_profile("reproducible")
@@ -49,14 +52,14 @@ def focus():
     def make(facets, antennas, frequency, x, y, z=0.0, **options):
         window = options.get("window", "rectangular")
         near, far = trajectory.range_extent(antennas, x, y, z)
-        profiles = imaging.compress(
+        profiles = focusing.compress(
             echo.simulate(facets, antennas, frequency=frequency, accuracy_db=None),
             near_range_m=near,
             far_range_m=far,
             window=window,
             oversampling=options.get("oversampling", 16),
         )
-        return imaging.backproject(profiles, antennas, x=x, y=y, z=z, window=window)
+        return focusing.backproject(profiles, antennas, x=x, y=y, z=z, window=window)
 
     return make
 

@@ -7,7 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from vinsar import config, design, ingest, lineage, reproduction
+from vinsar.prediction import design
+from vinsar.results import lineage, reproduction
+from vinsar.study import config, ingest
 
 
 def _study(name: str, files: list[str]) -> config.Study | None:
@@ -93,7 +95,7 @@ def _reproduce(arguments: argparse.Namespace) -> int:
 
 
 def _crate(arguments: argparse.Namespace) -> int:
-    from vinsar import crate
+    from vinsar.results import crate
 
     study = _known_study(Path(arguments.folder).name, arguments.configfile)
     archive = crate.write(arguments.folder, study, agent=arguments.agent)

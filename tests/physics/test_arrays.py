@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import aperture, radar, trajectory
+from vinsar.radar import aperture, trajectory, waveform
 
-FREQUENCY = radar.frequencies(13e9, 15e9, 201)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 WAVELENGTH = 299_792_458.0 / 14e9
 # N samples a step apart fill N steps: 201 x 10 MHz and 81 x 1 cm.
 BAND, LENGTH = FREQUENCY[[0, -1]] + [-5e6, 5e6], 0.81
@@ -84,12 +84,12 @@ def test_minus_3_db_widths_are_those_of_the_paths(focus, scatterers, system, y):
         lower.transmitter, lower.receiver, 0 * lower.receiver_travel,
         LENGTH / 0.8 * lower.receiver_travel,
     )  # fmt: skip
-    across, ahead = radar.ground_resolution(filled, 0.0, y, frequency=BAND)
+    across, ahead = waveform.ground_resolution(filled, 0.0, y, frequency=BAND)
     # One end moves: the cell across is twice that of a rail, lambda r / L.
     slant = float(np.linalg.norm([0, y, lower.receiver[2]]))
     assert across == pytest.approx(WAVELENGTH * slant / LENGTH, rel=1e-2)
     fine = np.linspace(-1, 1, 201)
-    factor = radar.window_width("rectangular")
+    factor = waveform.window_width("rectangular")
     for axis, cell in enumerate((across, ahead)):
         place = [np.zeros(1), np.array([y])]
         place[axis] = place[axis] + 2 * cell * fine
@@ -151,6 +151,6 @@ def test_a_switched_array_doubles_height_of_ambiguity_and_cell_of_the_rail():
     assert rail_ == pytest.approx(WAVELENGTH * np.hypot(13, 2.3) / 0.6, rel=1e-9)
     # To the ratio of the antenna heights' part in r2.
     assert arrays == pytest.approx([2 * rail_, 2 * rail_], rel=5e-3)
-    cells = [radar.ground_resolution(pair[0], 0.0, 13.0, frequency=BAND) for pair in pairs]
+    cells = [waveform.ground_resolution(pair[0], 0.0, 13.0, frequency=BAND) for pair in pairs]
     assert cells[1][0] == pytest.approx(2 * cells[0][0])
     assert cells[1][1] == pytest.approx(cells[0][1])

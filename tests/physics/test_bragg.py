@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import echo, geometry, scene, variables
+from vinsar.foundations import variables
+from vinsar.radar import geometry
+from vinsar.simulation import echo, scene
 
 SIZE, COUNT = 0.0321, 100
 FAR, HEIGHT = 200.0, 2.0

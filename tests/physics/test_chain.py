@@ -8,23 +8,12 @@ import numpy as np
 import pytest
 from scipy.special import spence
 
-from vinsar import (
-    aperture,
-    echo,
-    filtering,
-    geometry,
-    height,
-    imaging,
-    interferogram,
-    radar,
-    scene,
-    trajectory,
-    unwrapping,
-    variables,
-    visibility,
-)
+from vinsar.foundations import variables
+from vinsar.processing import filtering, focusing, height, interferogram, unwrapping
+from vinsar.radar import aperture, geometry, trajectory, waveform
+from vinsar.simulation import echo, scene, visibility
 
-FREQUENCY = radar.frequencies(13e9, 15e9, 201)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 WAVELENGTH = 299_792_458.0 / 14e9
 X, Y = np.linspace(-0.9, 0.9, 46), np.linspace(9.1, 11.3, 56)
 GRID_Y, GRID_X = np.meshgrid(Y, X, indexing="ij")
@@ -50,8 +39,8 @@ def focus(terrain, antennas):
     seen = visibility.facet_visibility(terrain, facets, antennas)
     signal = echo.simulate(facets, antennas, seen, frequency=FREQUENCY)
     near, far = trajectory.range_extent(antennas, X, Y)
-    profiles = imaging.compress(signal, near_range_m=near, far_range_m=far)
-    return imaging.backproject(profiles, antennas, x=X, y=Y)
+    profiles = focusing.compress(signal, near_range_m=near, far_range_m=far)
+    return focusing.backproject(profiles, antennas, x=X, y=Y)
 
 
 def reconstruct(images, reference):
@@ -94,7 +83,7 @@ def resolution_cells():
     # 81 positions fill 81 steps.
     place, travel = np.array([0.0, 0.0, 2.0]), np.array([0.81, 0.0, 0.0])
     antenna = aperture.Aperture(place, place, travel, travel)
-    along, ahead = radar.ground_resolution(antenna, 0.0, 10.2, frequency=FREQUENCY)
+    along, ahead = waveform.ground_resolution(antenna, 0.0, 10.2, frequency=FREQUENCY)
     return np.ptp(X) * np.ptp(Y) / (along * ahead)
 
 

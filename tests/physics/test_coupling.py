@@ -8,21 +8,16 @@ import numpy as np
 import pytest
 from scipy.special import fresnel
 
-from vinsar import (
-    echo,
-    imaging,
-    pipeline,
-    radar,
-    suppression,
-    trajectory,
-    validation,
-    variables,
-)
+from vinsar.foundations import variables
+from vinsar.processing import focusing, leakage
+from vinsar.radar import trajectory, waveform
+from vinsar.simulation import echo
+from vinsar.study import pipeline, validation
 
 CONFIG = Path(__file__).parents[2] / "config"
 
 LIGHT = 299_792_458.0
-FREQUENCY = radar.frequencies(13e9, 15e9, 401)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 401)
 WAVELENGTH = LIGHT / 14e9
 PLACES = [(0.0, 13.0), (0.2, 13.0), (0.4, 10.0), (0.6, 16.0), (2.0, 13.0)]
 
@@ -37,7 +32,7 @@ def fresnel_share(x, y, height, length):
 
 @pytest.mark.parametrize(("x", "y"), PLACES)
 def test_the_common_share_is_a_fresnel_integral(rail, x, y):
-    found = suppression.common_share(rail, x, y, WAVELENGTH)
+    found = leakage.common_share(rail, x, y, WAVELENGTH)
     # 81 samples 1 cm apart fill 0.81 m. The trapezoid's ends err by half a sample of 81 in m, the
     # next order of the range by 2 pi / lambda x^4 / 4 r^3: 0.06 rad at x + L / 2 = 1 m.
     for height, share in zip((2.0, 2.3), found, strict=True):
@@ -46,8 +41,8 @@ def test_the_common_share_is_a_fresnel_integral(rail, x, y):
 
 def image_of(facets, antennas, x, y, method):
     near, far = trajectory.range_extent(antennas, np.array([x]), np.array([y]))
-    profiles = imaging.compress(
-        suppression.suppress(
+    profiles = focusing.compress(
+        leakage.suppress(
             echo.simulate(facets, antennas, frequency=FREQUENCY, accuracy_db=None),
             method=method,
             gate_range_m=1.0,
@@ -55,21 +50,21 @@ def image_of(facets, antennas, x, y, method):
         near_range_m=near,
         far_range_m=far,
     )
-    images = imaging.backproject(profiles, antennas, x=np.array([x]), y=np.array([y]))
+    images = focusing.backproject(profiles, antennas, x=np.array([x]), y=np.array([y]))
     return images["image"].values[:, 0, 0]
 
 
 @pytest.mark.parametrize(("x", "y"), PLACES)
 def test_removing_what_is_common_costs_a_target_that_share_and_no_phase(rail, scatterers, x, y):
     found = image_of(scatterers([x, y, 0.0]), rail, x, y, "common")
-    share = suppression.common_share(rail, x, y, WAVELENGTH)
+    share = leakage.common_share(rail, x, y, WAVELENGTH)
     # Over the band of +-7 % the share changes, to second order: (0.07)^2; interpolation: 1e-3.
     np.testing.assert_allclose(np.abs(found), 1 - share, atol=0.01)
     assert np.abs(np.angle(found)).max() < 0.01
 
 
 def test_straight_ahead_a_quarter_of_the_amplitude_goes(rail):
-    ahead, aside = suppression.common_share(rail, [0.0, 1.5], 13.0, WAVELENGTH)[0]
+    ahead, aside = leakage.common_share(rail, [0.0, 1.5], 13.0, WAVELENGTH)[0]
     # C(1.526) = 0.422 and S(1.526) = 0.686: (C^2 + S^2) / 1.526^2.
     assert ahead == pytest.approx(0.28, abs=0.01)
     # Beyond the aperture's end, its two end points: at most (lambda r / 2 pi L (x - L/2))^2 twice.
@@ -95,7 +90,7 @@ def received_coupling(antennas, variation_db, level_db=60.0):
 
 def left_db(samples, method):
     data = variables.dataset("received", {"echo": samples}, {"frequency": FREQUENCY})
-    left = suppression.suppress(data, method=method, gate_range_m=1.0)["echo"].values
+    left = leakage.suppress(data, method=method, gate_range_m=1.0)["echo"].values
     return 10 * np.log10(np.mean(np.abs(left) ** 2) / np.mean(np.abs(samples) ** 2) + 1e-30)
 
 
@@ -145,7 +140,7 @@ def test_sidelobes_bury_the_scene_until_they_are_suppressed(shown):
     buried = float(power.sel(weighting="rectangular", suppression="none"))
     # Lobes 1 / (N sin(pi r / R)) in amplitude, of half their envelope's power in the mean.
     ranges = scene["slant_range"].where(within, drop=True).values
-    lobes = 1 / (201 * np.sin(np.pi * (ranges - 0.2) / radar.unambiguous_range(1e7)))
+    lobes = 1 / (201 * np.sin(np.pi * (ranges - 0.2) / waveform.unambiguous_range(1e7)))
     expected = 60 + 10 * np.log10(np.mean(lobes**2) / 2)
     assert 10 * np.log10(buried - clean) == pytest.approx(expected, abs=1.0)
     assert float(power.sel(weighting="hann", suppression="none")) < 2 * clean

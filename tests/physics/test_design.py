@@ -7,10 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import aperture, design, echo, imaging, pipeline, radar, trajectory, validation
+from vinsar.prediction import design
+from vinsar.processing import focusing
+from vinsar.radar import aperture, trajectory, waveform
+from vinsar.simulation import echo
+from vinsar.study import pipeline, validation
 
 CONFIG = Path(__file__).parents[2] / "config"
-FREQUENCY = radar.frequencies(13e9, 15e9, 201)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 WAVELENGTH = 299_792_458.0 / 14e9
 
 
@@ -24,12 +28,12 @@ def test_a_displaced_antenna_moves_the_height_of_a_point_target_as_predicted(
         told[end].values[1, :, axis] += offset_m
     pixel = np.array([x]), np.array([y])
     near, far = trajectory.range_extent(rail, *pixel)
-    profiles = imaging.compress(
+    profiles = focusing.compress(
         echo.simulate(scatterers([x, y, 0.0]), rail, frequency=FREQUENCY, accuracy_db=None),
         near_range_m=near - 0.5,
         far_range_m=far + 0.5,
     )
-    images = imaging.backproject(profiles, told, x=pixel[0], y=pixel[1])["image"].values[:, 0, 0]
+    images = focusing.backproject(profiles, told, x=pixel[0], y=pixel[1])["image"].values[:, 0, 0]
     lower, upper = trajectory.apertures(told)
     flat = aperture.flat_earth_phase(lower, upper, x, y, WAVELENGTH)
     phase = flat + np.angle(images[0] * images[1].conj())

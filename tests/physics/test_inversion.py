@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import height, unwrapping, variables
+from vinsar.foundations import variables
+from vinsar.processing import height, unwrapping
 
 X, Y = np.linspace(-2.5, 2.5, 126), np.linspace(10, 16, 301)
 GRID_Y, GRID_X = np.meshgrid(Y, X, indexing="ij")

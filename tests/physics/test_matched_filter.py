@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import echo, imaging, radar, trajectory, variables
+from vinsar.foundations import variables
+from vinsar.processing import focusing
+from vinsar.radar import trajectory, waveform
+from vinsar.simulation import echo
 
 LIGHT = 299_792_458.0
-FREQUENCY = radar.frequencies(13e9, 15e9, 101)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 101)
 X, Y = np.linspace(-0.6, 0.6, 25), np.linspace(5.4, 6.6, 21)
 # Wide, so that the kernel takes more than one tile of columns and one block of rows.
 WIDE_X, WIDE_Y = np.linspace(-2.5, 2.5, 300), np.linspace(10.0, 16.0, 35)
@@ -28,8 +31,8 @@ def half_paths(antennas, x, y, z):
 def matched_filter(signal, antennas, x, y, z, window):
     """``sum_l v_l sum_k w_k s_lk exp(4 pi i f_k rho_l / c)`` at each pixel."""
     samples, frequency = signal["echo"].values, signal["frequency"].values
-    weights = radar.window(window, frequency.size)
-    positions = radar.window(window, samples.shape[1])
+    weights = waveform.window(window, frequency.size)
+    positions = waveform.window(window, samples.shape[1])
     paths = half_paths(antennas, x, y, z)
     result = np.zeros((2, y.size, x.size), complex)
     for k, value in enumerate(frequency):
@@ -47,7 +50,7 @@ def speckle(scatterers):
 
 def profiles_of(signal, antennas, x, y, z, window, oversampling):
     near, far = trajectory.range_extent(antennas, x, y, z)
-    return imaging.compress(
+    return focusing.compress(
         signal, near_range_m=near, far_range_m=far, window=window, oversampling=oversampling
     )
 
@@ -60,9 +63,9 @@ def interpolation_error_db(profiles, frequency, window):
     """
     slant = profiles["slant_range"].values
     spacing = (slant[-1] - slant[0]) / (slant.size - 1)
-    f = 2 * (frequency - radar.carrier(frequency)) * spacing / LIGHT
+    f = 2 * (frequency - waveform.carrier(frequency)) * spacing / LIGHT
     images = sum((f / (f + n)) ** 4 for n in range(-50, 51) if n)
-    power = radar.window(window, frequency.size) ** 2
+    power = waveform.window(window, frequency.size) ** 2
     return 10 * np.log10((power @ images) / power.sum())
 
 
@@ -72,7 +75,7 @@ def test_a_speckled_image_errs_as_linear_interpolation_should(speckle, rail, win
     exact = matched_filter(signal, rail, X, Y, 0.0, window)
     for oversampling in (4, 16, 32):
         profiles = profiles_of(signal, rail, X, Y, 0.0, window, oversampling)
-        found = imaging.backproject(profiles, rail, x=X, y=Y, window=window)["image"].values
+        found = focusing.backproject(profiles, rail, x=X, y=Y, window=window)["image"].values
         error_db = 20 * np.log10(np.linalg.norm(found - exact) / np.linalg.norm(exact))
         expected = interpolation_error_db(profiles, FREQUENCY, window)
         # The error is speckle like the image: over the grid's ~100 resolution cells of two channels
@@ -93,13 +96,13 @@ def test_linear_interpolation_at_16_times_is_minus_64_db_for_a_full_band():
 def test_a_point_target_errs_nowhere_by_more_than_its_bound(scatterers, rail, window):
     signal = echo.simulate(scatterers([0.1, 6.0, 0.0]), rail, frequency=FREQUENCY, accuracy_db=None)
     profiles = profiles_of(signal, rail, X, Y, 0.0, window, 16)
-    found = imaging.backproject(profiles, rail, x=X, y=Y, window=window)["image"].values
+    found = focusing.backproject(profiles, rail, x=X, y=Y, window=window)["image"].values
     exact = matched_filter(signal, rail, X, Y, 0.0, window)
     slant = profiles["slant_range"].values
     spacing = (slant[-1] - slant[0]) / (slant.size - 1)
     # All images of a line at f together are at most 1 / sinc(f)^2 - 1, whatever their phases.
     images = 1 / np.sinc(2 * (FREQUENCY - 14e9) * spacing / LIGHT) ** 2 - 1
-    bound = radar.window(window, FREQUENCY.size) @ images
+    bound = waveform.window(window, FREQUENCY.size) @ images
     assert np.abs(found - exact).max() <= bound + 1e-6
 
 
@@ -109,7 +112,7 @@ def test_other_surfaces_and_antennas_are_focused_by_the_same_sum(speckle, system
     surface = 0.2 * np.sin(4 * X[None, :]) * np.cos(3 * Y[:, None])
     signal = echo.simulate(speckle, antennas, frequency=FREQUENCY, accuracy_db=None)
     profiles = profiles_of(signal, antennas, X, Y, surface, "rectangular", 16)
-    found = imaging.backproject(profiles, antennas, x=X, y=Y, z=surface)["image"].values
+    found = focusing.backproject(profiles, antennas, x=X, y=Y, z=surface)["image"].values
     exact = matched_filter(signal, antennas, X, Y, surface, "rectangular")
     error_db = 20 * np.log10(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     assert error_db <= interpolation_error_db(profiles, FREQUENCY, "rectangular") + 2
@@ -132,7 +135,7 @@ def straight_profiles(antennas, x, y, z):
 
 def floor_db(antennas, x, y, z):
     profiles, value_at = straight_profiles(antennas, x, y, z)
-    found = imaging.backproject(profiles, antennas, x=x, y=y, z=z)["image"].values
+    found = focusing.backproject(profiles, antennas, x=x, y=y, z=z)["image"].values
     paths = half_paths(antennas, x, y, z)
     turned = np.exp(4j * np.pi * 14e9 / LIGHT * paths)
     exact = np.mean(value_at(paths) * turned, axis=1)

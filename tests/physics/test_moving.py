@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import aperture, echo, imaging, motion, radar, registration, trajectory, validation
+from vinsar.evaluation import misregistration
+from vinsar.processing import focusing
+from vinsar.radar import aperture, motion, trajectory, waveform
+from vinsar.simulation import echo
+from vinsar.study import validation
 
 PAPER = Path(__file__).parents[2] / "config/paper.yaml"
 LIGHT = 299_792_458.0
-FREQUENCY = radar.frequencies(13e9, 15e9, 201)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 WAVELENGTH = LIGHT / 14e9
 # A cart at 1.6 m/s on the way and a switched array at 80 m/s.
 SCANS = {"rail": 0.5, "array": 0.01}
@@ -31,12 +35,12 @@ def image(scatterers):
 
     def make(target, truth, recorded, x, y):
         near, far = trajectory.range_extent(recorded, x, y)
-        profiles = imaging.compress(
+        profiles = focusing.compress(
             echo.simulate(scatterers(target), truth, frequency=FREQUENCY, accuracy_db=None),
             near_range_m=max(near - 1, 0),
             far_range_m=far + 1,
         )
-        return imaging.backproject(profiles, recorded, x=x, y=y)["image"].values
+        return focusing.backproject(profiles, recorded, x=x, y=y)["image"].values
 
     return make
 
@@ -66,7 +70,7 @@ def test_the_true_speed_focuses_a_point_at_its_place(moving, image, speed, scan)
         assert np.abs(cut).argmax() == 100
         # The images of linear interpolation at 16 times, as at rest.
         assert np.abs(cut[100] - 1) < 1.2e-3
-    factor = radar.window_width("rectangular")
+    factor = waveform.window_width("rectangular")
     assert width(2 * azimuth * fine, along) == pytest.approx(factor * azimuth, rel=0.03)
     assert width(2 * cell * fine, ahead) == pytest.approx(factor * cell, rel=0.03)
 
@@ -87,7 +91,9 @@ def test_a_wrong_speed_displaces_as_predicted(moving, image, speed, told, scan, 
     def imager(_):
         return lambda x, y: image(target, truth, recorded, x, y)
 
-    shift = registration.measure_shift(imager, np.array([*expected, 0.0]), np.array([0.17, 0.075]))
+    shift = misregistration.measure_shift(
+        imager, np.array([*expected, 0.0]), np.array([0.17, 0.075])
+    )
     # Of the squared way |k^2 - k'^2| s^2 / 2r remains, a mean and, as r changes over the aperture,
     # a cubic (test_motion.py); near the axis a range ramp moves x by 1 / (1 - k x / y) as much.
     x, y, _ = target

@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import detection, geometry, pipeline, validation
+from vinsar.processing import detection
+from vinsar.radar import geometry
+from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 HEIGHT = 0.2

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import radar
+from vinsar.radar import waveform
 
 LIGHT = 299_792_458.0
-FREQUENCY = radar.frequencies(13e9, 15e9, 201)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 WAVELENGTH = LIGHT / 14e9
 HEIGHTS = (2.0, 2.3)
 RAISED = [(3.0, 5.0, 0.3), (3.0, 15.0, 0.3), (0.0, 8.0, -0.2), (-2.0, 10.0, 0.25)]
@@ -96,7 +96,7 @@ def test_minus_3_db_widths_are_those_of_band_and_aperture(focus, rail, scatterer
     ahead = focus(scatterers(target), rail, FREQUENCY, np.array([0.0]), ahead_y, **options)[
         "image"
     ].values[0, :, 0]
-    factor = radar.window_width(window)
+    factor = waveform.window_width(window)
     assert width(2 * azimuth * fine, along) == pytest.approx(factor * azimuth, rel=0.03)
     assert width(2 * cell * fine, ahead) == pytest.approx(factor * cell, rel=0.03)
 

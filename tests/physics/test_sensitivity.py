@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vinsar import geometry
+from vinsar.radar import geometry
 
 WAVELENGTH = 299_792_458.0 / 14e9
 ANGLES = [np.deg2rad(value) for value in (30.0, 60.0, 90.0, 120.0)]

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vinsar import scene, variables, visibility
+from vinsar.foundations import variables
+from vinsar.simulation import scene, visibility
 
 SPACING = 0.025
 # As far apart as the rail's ends and the two antennas are.

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from vinsar import accuracy, variables
+from vinsar.evaluation import accuracy
+from vinsar.foundations import variables
 
 COORDS = {"x": np.arange(4.0), "y": np.arange(2.0)}
 

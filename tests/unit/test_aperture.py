@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import aperture, geometry
+from vinsar.radar import aperture, geometry
 
 WAVELENGTH = 0.0214
 STILL = np.zeros(3)

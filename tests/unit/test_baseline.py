@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import aperture, baseline, geometry, trajectory, validation, variables
+from vinsar.foundations import variables
+from vinsar.radar import aperture, baseline, geometry, trajectory
+from vinsar.study import validation
 
 BASELINE_M = 0.3
 LENGTH_STD_M = 1e-5

@@ -8,7 +8,7 @@ import dask
 import numpy as np
 import pytest
 
-from vinsar import blocks
+from vinsar.foundations import blocks
 
 
 @pytest.mark.parametrize("workers", [1, 4])

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from vinsar import checkpoint
+from vinsar.sweeps import checkpoint
 
 
 @pytest.fixture

@@ -4,7 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import claims, detection, pipeline, validation, variables
+from vinsar.foundations import variables
+from vinsar.paper import claims
+from vinsar.processing import detection
+from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 

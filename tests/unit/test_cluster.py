@@ -12,7 +12,8 @@ import psutil
 import pytest
 import xarray as xr
 
-from vinsar import cluster, config, sweep, validation
+from vinsar.study import config, validation
+from vinsar.sweeps import cluster, sweep
 
 ROOT = Path(__file__).parents[2]
 OVER = {"motion.level_wavelengths": [0.0, 0.1, 0.2], "filtering.goldstein_alpha": [0.3, 0.8]}

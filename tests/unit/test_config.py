@@ -5,7 +5,7 @@ import pytest
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from vinsar import config
+from vinsar.study import config
 
 CONFIG = Path(__file__).parents[2] / "config"
 

@@ -7,8 +7,10 @@ import netCDF4
 import numpy as np
 import pytest
 
-from vinsar import provenance, storage, sweep, variables
-from vinsar.constants import REGIONS
+from vinsar.foundations import variables
+from vinsar.foundations.constants import REGIONS
+from vinsar.results import provenance, storage
+from vinsar.sweeps import sweep
 
 HIGH = 3
 LABELS = {

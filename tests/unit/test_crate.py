@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vinsar import crate, lineage, provenance, validation
+from vinsar.results import crate, lineage, provenance
+from vinsar.study import validation
 
 ROOT = Path(__file__).parents[2]
 

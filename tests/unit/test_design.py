@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vinsar import aperture, baseline, config, design, geometry, radar, trajectory, validation
+from vinsar.prediction import design
+from vinsar.radar import aperture, baseline, geometry, trajectory, waveform
+from vinsar.study import config, validation
 
 CONFIG = Path(__file__).parents[2] / "config"
 WAVELENGTH = 299_792_458.0 / 14e9
@@ -113,7 +115,7 @@ def test_grating_lobes_bound_the_width():
     width, slant = sheet.unambiguous_width(13.0), float(sheet.slant_range(13.0))
     # 4 d sin(squint) = the shortest wavelength; the aperture's ends change the mean by (L / r)^2.
     sine = (width / 2) / np.hypot(width / 2, slant)
-    assert sine == pytest.approx(radar.wavelength(15e9) / (4 * 0.01), rel=2e-3)
+    assert sine == pytest.approx(waveform.wavelength(15e9) / (4 * 0.01), rel=2e-3)
     dense = sheet_of(radar={"position_spacing_m": 0.004})
     assert dense.unambiguous_width(13.0) == np.inf
 

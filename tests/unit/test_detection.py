@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from vinsar import config, detection, variables
+from vinsar.foundations import variables
+from vinsar.processing import detection
+from vinsar.study import config
 
 OPTIONS = {
     "threshold_m": 0.1,

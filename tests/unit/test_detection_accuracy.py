@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from vinsar import config, detection, detection_accuracy, variables
+from vinsar.evaluation import detection_accuracy
+from vinsar.foundations import variables
+from vinsar.processing import detection
+from vinsar.study import config
 
 OPTIONS = config.Detection(
     threshold_m=0.1,

@@ -7,14 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import echo, radar, variables
+from vinsar.foundations import variables
+from vinsar.radar import waveform
+from vinsar.simulation import echo
 
 LIGHT = 299_792_458.0
 
 
 @pytest.fixture(scope="module")
 def frequency():
-    return radar.frequencies(13e9, 15e9, 101)
+    return waveform.frequencies(13e9, 15e9, 101)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +47,7 @@ def test_a_single_point_has_the_phase_of_its_path(few, scatterers, x, y, z):
 @pytest.mark.parametrize("count", [401, 200])
 @pytest.mark.parametrize("accuracy_db", [-60.0, -90.0, -110.0, -160.0])
 def test_the_fast_sum_errs_less_than_asked(cloud, few, accuracy_db, count):
-    frequency = radar.frequencies(13e9, 15e9, count)
+    frequency = waveform.frequencies(13e9, 15e9, count)
     direct = echo.simulate(cloud, few, frequency=frequency, accuracy_db=None)["echo"].values
     fast = echo.simulate(cloud, few, frequency=frequency, accuracy_db=accuracy_db)["echo"].values
     error = np.linalg.norm(fast - direct, axis=-1) / np.linalg.norm(direct, axis=-1)
@@ -158,7 +160,7 @@ def speckle(scatterers, rail):
     rng = np.random.default_rng(8)
     slant = rng.uniform(10.0, 10.0 + SWATH, 4000)
     facets = scatterers(np.stack([np.zeros(4000), np.sqrt(slant**2 - 4), np.zeros(4000)], axis=1))
-    data = echo.simulate(facets, rail, frequency=radar.frequencies(13e9, 15e9, 201))
+    data = echo.simulate(facets, rail, frequency=waveform.frequencies(13e9, 15e9, 201))
     return data.assign(echo=data["echo"] * np.array([2.0, 1.0])[:, None, None])
 
 
@@ -174,7 +176,7 @@ def test_noise_gives_a_range_cell_the_signal_to_noise_ratio_asked_for(speckle, s
     count = clean.shape[-1]
     cells = np.abs(np.fft.ifft(noise, axis=-1)) ** 2
     signal = np.abs(np.fft.ifft(clean, axis=-1)) ** 2
-    slant = np.arange(count) * radar.unambiguous_range(1e7) / count
+    slant = np.arange(count) * waveform.unambiguous_range(1e7) / count
     inside = (slant >= 10.0) & (slant < 10.0 + SWATH)
     ratio = signal[..., inside].mean() / cells.mean()
     # Exponential noise powers: relative error 1 / sqrt(n), four of them. And of the swath's 80
@@ -242,7 +244,7 @@ def test_the_coupling_peaks_as_far_above_the_scene_s_cells_as_asked(speckle, rai
     count = found.shape[-1]
     peak = np.abs(np.fft.ifft(found, axis=-1))[..., 0] ** 2
     clean = np.abs(np.fft.ifft(speckle["echo"].values, axis=-1)) ** 2
-    slant = np.arange(count) * radar.unambiguous_range(1e7) / count
+    slant = np.arange(count) * waveform.unambiguous_range(1e7) / count
     inside = (slant >= 10.0) & (slant < 10.0 + SWATH)
     # Sidelobes beyond the swath's edges take some hundredths of a dB of the scene.
     assert 10 * np.log10(peak.mean() / clean[..., inside].mean()) == pytest.approx(

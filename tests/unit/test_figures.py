@@ -20,18 +20,8 @@ import yaml
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from vinsar import (
-    baseline,
-    config,
-    detection_accuracy,
-    figures,
-    geometry,
-    motion,
-    pipeline,
-    systems,
-    validation,
-    variables,
-)
+from vinsar import figures
+from vinsar.evaluation import detection_accuracy
 from vinsar.figures import (
     acquisition,
     baselines,
@@ -45,6 +35,10 @@ from vinsar.figures import (
     sweeps,
     thumbnails,
 )
+from vinsar.foundations import variables
+from vinsar.prediction import systems
+from vinsar.radar import baseline, geometry, motion
+from vinsar.study import config, pipeline, validation
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
 OF_SWEEPS = ["fig5", "baseline_length", "baseline_vibration", "snr", "moving", "systems"]
@@ -1035,7 +1029,7 @@ from pathlib import Path
 import yaml
 import vinsar.figures
 assert "matplotlib" not in sys.modules, "importing the figures is not light"
-from vinsar import config
+from vinsar.study import config
 study = config.Study.model_validate(yaml.safe_load(Path(sys.argv[1]).read_text(encoding="utf-8")))
 paths = [Path(sys.argv[2]) / f"fig1.{suffix}" for suffix in ("pdf", "svg", "png")]
 figure = vinsar.figures.FIGURES["fig1"].draw({}, study)

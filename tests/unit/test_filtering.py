@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import filtering, variables
+from vinsar.foundations import variables
+from vinsar.processing import filtering
 
 
 def speckle(seed, shape):

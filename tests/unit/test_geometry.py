@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vinsar import geometry
+from vinsar.radar import geometry
 
 WAVELENGTH = 0.0214
 heights = st.floats(-0.5, 1.0)

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import geometry, height
+from vinsar.processing import height
+from vinsar.radar import geometry
 
 X, Y = np.linspace(-1, 1, 21), np.linspace(8, 11, 61)
 GRID_Y, GRID_X = np.meshgrid(Y, X, indexing="ij")

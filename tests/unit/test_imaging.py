@@ -8,14 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import echo, imaging, radar, trajectory, variables
+from vinsar.foundations import variables
+from vinsar.processing import focusing
+from vinsar.radar import trajectory, waveform
+from vinsar.simulation import echo
 
 LIGHT = 299_792_458.0
 
 
 @pytest.fixture(scope="module")
 def frequency():
-    return radar.frequencies(13e9, 15e9, 101)
+    return waveform.frequencies(13e9, 15e9, 101)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +28,7 @@ def point_echo(scatterers, rail, frequency):
 
 
 def compress(signal, near=4.0, far=7.4, **options):
-    return imaging.compress(signal, near_range_m=near, far_range_m=far, **options)
+    return focusing.compress(signal, near_range_m=near, far_range_m=far, **options)
 
 
 @given(
@@ -41,7 +44,7 @@ def test_profiles_interpolate_linearly_to_the_sum_over_frequencies(
     slant = profiles["slant_range"].values
     profile = profiles["profile"].values[1, 17]
     found = np.interp(distance, slant, profile.real) + 1j * np.interp(distance, slant, profile.imag)
-    weights = radar.window(window, frequency.size)
+    weights = waveform.window(window, frequency.size)
     turns = 2 * (frequency - 14e9) * distance / LIGHT
     expected = (weights * point_echo["echo"].values[1, 17]) @ np.exp(2j * np.pi * turns)
     # Linear interpolation of a line at f (in units of the sampling rate) leaves images at f + n of
@@ -54,7 +57,7 @@ def test_profiles_interpolate_linearly_to_the_sum_over_frequencies(
 @pytest.mark.parametrize("oversampling", [2, 7, 16])
 def test_profiles_sample_a_resolution_cell_as_often_as_asked(point_echo, oversampling):
     slant = compress(point_echo, oversampling=oversampling)["slant_range"].values
-    cell = radar.range_resolution(101 * 2e7)
+    cell = waveform.range_resolution(101 * 2e7)
     assert np.diff(slant).max() <= cell / oversampling * (1 + 1e-9)
     np.testing.assert_allclose(np.diff(slant), slant[1] - slant[0], rtol=1e-9)
     assert slant[0] <= 4.0
@@ -93,7 +96,7 @@ X, Y = np.linspace(-0.5, 0.7, 25), np.linspace(5.5, 6.5, 70)
 
 
 def image(profiles, antennas, **options):
-    return imaging.backproject(profiles, antennas, x=X, y=Y, **options)
+    return focusing.backproject(profiles, antennas, x=X, y=Y, **options)
 
 
 def test_images_carry_the_wavelength_and_the_positions(point_echo, rail):
@@ -123,7 +126,7 @@ def test_a_pixel_does_not_depend_on_the_grid_around_it(point_echo, rail):
     profiles = compress(point_echo)
     whole = image(profiles, rail)["image"].values
     for row, column in ((0, 0), (31, 3), (32, 24), (69, 12)):
-        single = imaging.backproject(profiles, rail, x=X[column : column + 1], y=Y[row : row + 1])[
+        single = focusing.backproject(profiles, rail, x=X[column : column + 1], y=Y[row : row + 1])[
             "image"
         ].values[:, 0, 0]
         np.testing.assert_allclose(single, whole[:, row, column], atol=1e-5)

@@ -10,7 +10,8 @@ import pytest
 import rasterio
 import xarray as xr
 
-from vinsar import config, ingest, pipeline, storage, validation
+from vinsar.results import storage
+from vinsar.study import config, ingest, pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 FILES = (ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")

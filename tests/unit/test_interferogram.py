@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from vinsar import interferogram, variables
+from vinsar.foundations import variables
+from vinsar.processing import interferogram
 
 
 def images(lower, upper):

@@ -12,20 +12,15 @@ import dask
 import numpy as np
 import pytest
 
-from vinsar import echo, filtering, imaging, radar, scene, trajectory, variables, visibility
-from vinsar.kernels import (
-    backprojection,
-    columns,
-    functions,
-    lookup,
-    multilook,
-    patches,
-    splat,
-)
+from vinsar.foundations import variables
+from vinsar.kernels import backprojection, columns, functions, lookup, multilook, patches, splat
 from vinsar.kernels.compiling import kernel
+from vinsar.processing import filtering, focusing
+from vinsar.radar import trajectory, waveform
+from vinsar.simulation import echo, scene, visibility
 
 LIGHT = 299_792_458.0
-PACKAGE = Path(imaging.__file__).parent
+PACKAGE = Path(focusing.__file__).parents[1]
 X, Y = np.linspace(-2.5, 2.5, 251), np.linspace(10.0, 10.6, 31)
 
 
@@ -87,14 +82,14 @@ def test_wide_and_narrow_groups_get_their_windows():
 def signal(scatterers, rail):
     rng = np.random.default_rng(3)
     place = rng.uniform([-2.5, 10.0, 0.0], [2.5, 10.6, 0.0], (500, 3))
-    frequency = radar.frequencies(13e9, 15e9, 401)
+    frequency = waveform.frequencies(13e9, 15e9, 401)
     return echo.simulate(scatterers(place, rng.random(500)), rail, frequency=frequency)
 
 
 def image(signal, antennas, x=X, y=Y, **options):
     near, far = trajectory.range_extent(antennas, x, y)
-    profiles = imaging.compress(signal, near_range_m=near - 0.1, far_range_m=far + 0.1, **options)
-    return imaging.backproject(profiles, antennas, x=x, y=y)["image"].values
+    profiles = focusing.compress(signal, near_range_m=near - 0.1, far_range_m=far + 0.1, **options)
+    return focusing.backproject(profiles, antennas, x=x, y=y)["image"].values
 
 
 # Grids coarser and finer than the positions' spacing of 1 cm, and one beyond all windows.
@@ -126,7 +121,7 @@ def test_images_of_any_width_hold_the_same_pixels(signal, rail, count):
 @pytest.mark.parametrize(("oversampling", "expected"), [(4, -79), (6, -93), (8, -103)])
 def test_cubic_interpolation_errs_as_published(scatterers, rail, oversampling, expected):
     rng = np.random.default_rng(4)
-    frequency = radar.frequencies(13e9, 15e9, 101)
+    frequency = waveform.frequencies(13e9, 15e9, 101)
     place = rng.uniform([-0.6, 5.4, 0.0], [0.6, 6.6, 0.0], (800, 3))
     data = echo.simulate(scatterers(place), rail, frequency=frequency, accuracy_db=None)
     x, y = np.linspace(-0.6, 0.6, 25), np.linspace(5.4, 6.6, 21)
@@ -187,7 +182,7 @@ def test_the_splat_errs_less_than_it_says_on_the_papers_facets(rail, jitter, cou
     )
     few = rail.isel(position=[0, 60])
     seen = visibility.facet_visibility(terrain, facets, few)
-    frequency = radar.frequencies(13e9, 15e9, count)
+    frequency = waveform.frequencies(13e9, 15e9, count)
     ways = [
         echo.simulate(facets, few, seen, frequency=frequency, spreading=True, accuracy_db=accuracy)
         for accuracy in (echo.MOST_ACCURATE_SPLAT_DB, None)
@@ -208,7 +203,7 @@ def test_results_do_not_depend_on_the_threads(signal, rail, scatterers):
     rng = np.random.default_rng(7)
     noise = rng.normal(size=(90, 80, 2)).view(complex)[..., 0].astype(np.complex64)
     cloud = scatterers(rng.uniform([-2, 10, 0], [2, 15, 0.3], (3000, 3)))
-    frequency = radar.frequencies(13e9, 15e9, 51)
+    frequency = waveform.frequencies(13e9, 15e9, 51)
     for compute in (
         lambda: filtering.goldstein(noise, alpha=0.7, patch_px=32, step_px=4),
         lambda: image(signal, rail),
@@ -363,5 +358,5 @@ def test_compiled_kernels_are_kept_wherever_something_can_be_written(tmp_path, w
 
 def test_the_library_starts_without_what_only_kernels_and_figures_need():
     heavy = "numba", "scipy", "finufft", "dask", "distributed", "matplotlib", "netCDF4"
-    code = f"import sys, vinsar.pipeline; print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, vinsar.study.pipeline; print([m for m in {heavy} if m in sys.modules])"
     assert python(code, PYTHONPATH=str(PACKAGE.parent)).strip() == "[]"

@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from vinsar import lineage
+from vinsar.results import lineage
 
 
 @pytest.fixture

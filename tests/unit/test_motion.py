@@ -4,11 +4,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.special import fresnel
 
-from vinsar import config, echo, imaging, motion, pipeline, radar, trajectory, variables
-from vinsar.constants import SPEED_OF_LIGHT
+from vinsar.foundations import variables
+from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.processing import focusing
+from vinsar.radar import motion, trajectory, waveform
+from vinsar.simulation import echo
+from vinsar.study import config, pipeline
 
-FREQUENCY = radar.frequencies(13e9, 15e9, 101)
-WAVELENGTH = radar.wavelength(radar.carrier(FREQUENCY))
+FREQUENCY = waveform.frequencies(13e9, 15e9, 101)
+WAVELENGTH = waveform.wavelength(waveform.carrier(FREQUENCY))
 POINT = np.array([0.3, 13.0, 0.0])
 
 
@@ -153,13 +157,13 @@ def test_true_and_recorded_errors_have_opposite_effects_to_first_order(
     x, y = np.array([0.0, POINT[0]]), np.array([12.0, POINT[1]])
 
     def image(truth, recorded):
-        profiles = imaging.compress(
+        profiles = focusing.compress(
             echo.simulate(scatterers(POINT), truth, frequency=FREQUENCY, accuracy_db=None),
             near_range_m=11.0,
             far_range_m=15.0,
             oversampling=32,
         )
-        return imaging.backproject(profiles, recorded, x=x, y=y)["image"].values[:, 1, 1]
+        return focusing.backproject(profiles, recorded, x=x, y=y)["image"].values[:, 1, 1]
 
     from_record, from_path = image(rail, moved), image(moved, rail)
     # By theory: the mean of 4 pi / lambda times the change of range.
@@ -196,7 +200,7 @@ def test_the_point_gain_is_that_of_the_direct_sum(bistatic):
     moved = motion.displace(
         bistatic, axis="y", draw=lambda channel, n: draw(n, channel, std_m=0.3 * WAVELENGTH)
     )
-    weights = radar.window("hann", FREQUENCY.size), radar.window("hamming", 81)
+    weights = waveform.window("hann", FREQUENCY.size), waveform.window("hamming", 81)
 
     def path(antennas):
         legs = [
@@ -217,8 +221,8 @@ def test_the_point_gain_is_that_of_the_direct_sum(bistatic):
 @pytest.mark.parametrize("distribution", ["uniform", "normal"])
 def test_the_point_gain_follows_the_characteristic_function(rail, distribution, level):
     """E|g|^2 = m^2 + (1 - m^2) / N with m = sin(a) / a or exp(-s^2 / 2)."""
-    carrier = radar.carrier(FREQUENCY)
-    narrow = radar.frequencies(carrier - 1e6, carrier + 1e6, 3)
+    carrier = waveform.carrier(FREQUENCY)
+    narrow = waveform.frequencies(carrier - 1e6, carrier + 1e6, 3)
     std = level * WAVELENGTH
     found = [
         gain(
@@ -360,8 +364,8 @@ def test_the_ranges_match_best_where_theory_has_the_image(rail, true, told):
 
 @pytest.mark.parametrize(("true", "told"), [(0.5, 0.0), (0.9, 0.0), (3.0, 3.1)])
 def test_a_wrong_speed_defocuses_by_the_quadratic_rest(rail, true, told):
-    carrier = radar.carrier(FREQUENCY)
-    narrow = radar.frequencies(carrier - 1e6, carrier + 1e6, 3)
+    carrier = waveform.carrier(FREQUENCY)
+    narrow = waveform.frequencies(carrier - 1e6, carrier + 1e6, 3)
     truth, recorded = (
         motion.advance(rail, speed_m_per_s=slope * 1.6, duration_s=0.5) for slope in (true, told)
     )
@@ -394,4 +398,4 @@ def test_the_margin_of_the_profiles_covers_the_errors_or_says_so(rail):
     near, most = trajectory.range_extent(far, np.array([0.0, 1.0]), np.array([11.0, 12.0]))
     assert most > 14 > near
     with pytest.raises(ValueError, match=r"the profiles cover 11.00 to 14.00 m of slant range"):
-        imaging.backproject(profiles, far, x=np.array([0.0, 1.0]), y=np.array([11.0, 12.0]))
+        focusing.backproject(profiles, far, x=np.array([0.0, 1.0]), y=np.array([11.0, 12.0]))

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from vinsar import config, pipeline, validation, variables
+from vinsar.foundations import variables
+from vinsar.study import config, pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 PROCESSING = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")

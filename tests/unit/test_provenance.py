@@ -3,7 +3,8 @@ import json
 
 import pytest
 
-from vinsar import pipeline, provenance
+from vinsar.results import provenance
+from vinsar.study import pipeline
 
 
 def names(*modules):
@@ -11,11 +12,11 @@ def names(*modules):
 
 
 def test_sources_follow_imports_inside_functions():
-    assert {"visibility", "scene", "fan", "blocks"} <= names("visibility")
+    assert {"visibility", "scene", "fan", "blocks"} <= names("simulation.visibility")
 
 
 def test_sources_leave_out_what_is_not_imported():
-    assert not {"echo", "scene", "visibility", "imaging", "height"} & names("filtering")
+    assert not {"echo", "scene", "visibility", "focusing", "height"} & names("processing.filtering")
 
 
 def test_imports_for_type_checkers_do_not_count():

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import aperture, radar
+from vinsar.radar import aperture, waveform
 
 WINDOWS = ("rectangular", "hann", "hamming", "blackman")
 LIGHT = 299_792_458.0
 
 
 def test_frequencies_hold_both_ends_at_an_even_step():
-    frequency = radar.frequencies(13e9, 15e9, 401)
+    frequency = waveform.frequencies(13e9, 15e9, 401)
     assert frequency.shape == (401,)
     assert (frequency[0], frequency[-1]) == (13e9, 15e9)
     np.testing.assert_allclose(np.diff(frequency), 5e6, rtol=1e-9)
@@ -30,24 +30,24 @@ def test_frequencies_hold_both_ends_at_an_even_step():
 )
 def test_impossible_frequencies_are_refused(start, stop, count, message):
     with pytest.raises(ValueError, match=message):
-        radar.frequencies(start, stop, count)
+        waveform.frequencies(start, stop, count)
 
 
 def test_carrier_and_wavelength_of_the_paper():
-    carrier = radar.carrier(radar.frequencies(13e9, 15e9, 401))
+    carrier = waveform.carrier(waveform.frequencies(13e9, 15e9, 401))
     assert carrier == 14e9
-    assert radar.wavelength(carrier) == pytest.approx(0.021413747, rel=1e-7)
+    assert waveform.wavelength(carrier) == pytest.approx(0.021413747, rel=1e-7)
 
 
 def test_range_resolution_turns_the_phase_across_the_band_by_one_cycle():
-    cell = radar.range_resolution(2e9)
+    cell = waveform.range_resolution(2e9)
     assert cell == pytest.approx(0.0749, abs=1e-4)
     assert 2 * cell / LIGHT * 2e9 == pytest.approx(1)
 
 
 def test_a_stepped_waveform_repeats_after_the_unambiguous_range():
-    frequency = radar.frequencies(13e9, 15e9, 401)
-    period = radar.unambiguous_range(5e6)
+    frequency = waveform.frequencies(13e9, 15e9, 401)
+    period = waveform.unambiguous_range(5e6)
     turns = 2 * (frequency - frequency[0]) * period / LIGHT
     np.testing.assert_allclose(turns, np.rint(turns), atol=1e-9)
     # ... and not before: one step turns the phase by a single cycle.
@@ -58,7 +58,7 @@ def test_azimuth_resolution_turns_the_phase_along_the_aperture_by_one_cycle():
     # A target off by the resolution changes the path to the ends of the aperture, out and back,
     # by a wavelength more at one end than at the other.
     length, distance, wavelength = 0.8, 1e3, 2e-4
-    cell = float(radar.azimuth_resolution(wavelength, distance, length))
+    cell = float(waveform.azimuth_resolution(wavelength, distance, length))
     ends = np.array([-length / 2, length / 2])
     path = 2 * np.hypot(distance, cell - ends)
     assert path[0] - path[1] == pytest.approx(wavelength, rel=1e-6)
@@ -70,8 +70,8 @@ def monostatic(length):
 
 
 def test_ground_resolution_straight_ahead_is_that_of_band_and_aperture():
-    frequency = radar.frequencies(13e9, 15e9, 201)
-    along, ahead = radar.ground_resolution(monostatic(0.8), 0.0, 13.0, frequency=frequency)
+    frequency = waveform.frequencies(13e9, 15e9, 201)
+    along, ahead = waveform.ground_resolution(monostatic(0.8), 0.0, 13.0, frequency=frequency)
     slant = np.hypot(13, 2)
     assert along == pytest.approx(LIGHT / 14e9 * slant / 1.6)
     # c / 2W on the slant is longer on the ground by the cosine of the depression.
@@ -80,9 +80,9 @@ def test_ground_resolution_straight_ahead_is_that_of_band_and_aperture():
 
 def test_ground_resolution_off_the_axis_is_the_slope_of_ranges_and_bearings():
     # Differences of exact ranges: between the aperture's ends over x, and over y.
-    frequency = radar.frequencies(13e9, 15e9, 201)
+    frequency = waveform.frequencies(13e9, 15e9, 201)
     position, x, y = np.array([0.0, 0.0, 2.0]), 3.0, 8.0
-    along, ahead = radar.ground_resolution(monostatic(0.8), x, y, frequency=frequency)
+    along, ahead = waveform.ground_resolution(monostatic(0.8), x, y, frequency=frequency)
     ends = np.array([[-0.4, 0, 2.0], [0.4, 0, 2.0]])
     step = 1e-5
 
@@ -102,7 +102,7 @@ def test_ground_resolution_off_the_axis_is_the_slope_of_ranges_and_bearings():
 
 @given(name=st.sampled_from(WINDOWS), count=st.integers(1, 500))
 def test_windows_sum_to_one_are_symmetric_and_waste_no_sample(name, count):
-    weights = radar.window(name, count)
+    weights = waveform.window(name, count)
     assert weights.shape == (count,)
     assert weights.sum() == pytest.approx(1)
     assert weights.min() > 0
@@ -112,10 +112,10 @@ def test_windows_sum_to_one_are_symmetric_and_waste_no_sample(name, count):
 @pytest.mark.parametrize("name", WINDOWS)
 def test_window_width_is_that_of_the_transform_of_a_long_window(name):
     count = 4000
-    weights = radar.window(name, count)
+    weights = waveform.window(name, count)
     place = np.arange(count) - (count - 1) / 2
     u = np.linspace(0.3, 1.2, 1801)
     power = np.abs(np.exp(-2j * np.pi * np.outer(u, place) / count) @ weights) ** 2
     half = np.interp(0.5, power[::-1], u[::-1])
     # The end samples widen or narrow a window of N samples by about 1 / N.
-    assert radar.window_width(name) == pytest.approx(2 * half, rel=2 / count)
+    assert waveform.window_width(name) == pytest.approx(2 * half, rel=2 / count)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import yaml
 
-from vinsar import reference
+from vinsar.study import reference
 
 CONFIG = Path(__file__).parents[2] / "config"
 PAPER = yaml.safe_load((CONFIG / "paper.yaml").read_text())
-REMEDY = "make it anew with `.venv/bin/python -m vinsar.reference config`"
+REMEDY = "make it anew with `.venv/bin/python -m vinsar.study.reference config`"
 
 
 def test_the_reference_page_is_in_step_with_the_models():

@@ -7,9 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import echo, imaging, radar, registration, trajectory, variables
+from vinsar.evaluation import misregistration
+from vinsar.foundations import variables
+from vinsar.processing import focusing
+from vinsar.radar import trajectory, waveform
+from vinsar.simulation import echo
 
-FREQUENCY = radar.frequencies(13e9, 15e9, 201)
+FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 HEIGHTS = np.array([-0.3, 0.0, 0.3])
 NEAR, FAR = 0, 1
 
@@ -21,19 +25,19 @@ def imager(rail):
             "facets", {"facet_position": target[None, :], "reflectivity": np.ones(1)}
         )
         near, far = trajectory.range_extent(rail, target[:1], target[1:2], target[2])
-        profiles = imaging.compress(
+        profiles = focusing.compress(
             echo.simulate(point, rail, frequency=FREQUENCY, accuracy_db=None),
             near_range_m=near - 1.0,
             far_range_m=far + 1.0,
         )
-        return lambda x, y: imaging.backproject(profiles, rail, x=x, y=y)["image"].values
+        return lambda x, y: focusing.backproject(profiles, rail, x=x, y=y)["image"].values
 
     return image_point
 
 
 @pytest.fixture(scope="module")
 def analysis(rail, imager):
-    return registration.analyze(
+    return misregistration.analyze(
         trajectory.apertures(rail),
         imager,
         targets={"near": (3.0, 5.0), "far": (3.0, 15.0)},
@@ -124,5 +128,5 @@ def test_peak_of_a_paraboloid_is_found_exactly(at_x, at_y, widths, twist):
     u, v = u - at_x, v - at_y
     cross = twist * np.sqrt(widths[0] * widths[1])
     power = 10 - widths[0] * u**2 - widths[1] * v**2 - cross * u * v
-    found = registration.peak(np.sqrt(power) * np.exp(1j), x, y)
+    found = misregistration.peak(np.sqrt(power) * np.exp(1j), x, y)
     assert found == pytest.approx((3 + 0.01 * at_x, 7 + 0.02 * at_y), abs=1e-9)

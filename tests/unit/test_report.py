@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
-from vinsar import config, figures, lineage, report, variables
+from vinsar import figures, report
 from vinsar.figures import style
+from vinsar.foundations import variables
 from vinsar.report import content
+from vinsar.results import lineage
+from vinsar.study import config
 
 ROOT = Path(__file__).parents[2]
 PAPER = yaml.safe_load((ROOT / "config/paper.yaml").read_text(encoding="utf-8"))

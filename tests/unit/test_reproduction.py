@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from vinsar import lineage, reproduction
+from vinsar.results import lineage, reproduction
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from vinsar import config, scene
+from vinsar.simulation import scene
+from vinsar.study import config
 
 
 def make(name="peaks", **changes):

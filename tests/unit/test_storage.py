@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from vinsar import storage, variables
+from vinsar.foundations import variables
+from vinsar.results import storage
 
 
 def images():

@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from vinsar import config, pipeline, storage, sweep, validation, variables
+from vinsar.foundations import variables
+from vinsar.results import storage
+from vinsar.study import config, pipeline, validation
+from vinsar.sweeps import sweep
 
 ROOT = Path(__file__).parents[2]
 STATISTICS = {name for name in variables.SWEEP if variables.SWEEP[name].dims == ("region",)}

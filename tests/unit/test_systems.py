@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar import config, systems, validation, variables
+from vinsar.foundations import variables
+from vinsar.prediction import systems
+from vinsar.study import config, validation
 
 CONFIG = Path(__file__).parents[2] / "config"
 

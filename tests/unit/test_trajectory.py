@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vinsar import trajectory, validation
+from vinsar.radar import trajectory
+from vinsar.study import validation
 
 
 def make(angle_deg, **changes):

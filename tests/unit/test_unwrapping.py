@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from vinsar import unwrapping, variables
+from vinsar.foundations import variables
+from vinsar.processing import unwrapping
 
 METHODS = ("whirlwind", "skimage", "kamui")
 

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from vinsar import validation
+from vinsar.study import validation
 
 CONFIG = Path(__file__).parents[2] / "config"
 PAPER = yaml.safe_load((CONFIG / "paper.yaml").read_text())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import variables
+from vinsar.foundations import variables
 
 DECLARED = [
     (product, name, variable)

@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from vinsar import pipeline, validation, variants
+from vinsar.study import pipeline, validation
+from vinsar.sweeps import variants
 
 ROOT = Path(__file__).parents[2]
 

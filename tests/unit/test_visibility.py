@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar import echo, scene, variables, visibility
+from vinsar.foundations import variables
+from vinsar.simulation import echo, scene, visibility
 
 
 @pytest.fixture(scope="module")

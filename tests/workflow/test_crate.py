@@ -13,7 +13,8 @@ import requests_cache
 import rocrate
 from urllib3 import HTTPResponse
 
-from vinsar import lineage, provenance, validation
+from vinsar.results import lineage, provenance
+from vinsar.study import validation
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ("--configfile", "tiny.yaml")

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from vinsar import design, validation
+from vinsar.prediction import design
+from vinsar.study import validation
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,7 +9,8 @@ import netCDF4
 import pytest
 import xarray as xr
 
-from vinsar import pipeline, storage
+from vinsar.results import storage
+from vinsar.study import pipeline
 
 ECHOES = """
 measurement: {file: echo.nc}

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from vinsar import lineage, pipeline, validation
 from vinsar.figures import thumbnails
+from vinsar.results import lineage
+from vinsar.study import pipeline, validation
 
 sys.path.insert(0, str(Path(__file__).parent))
 import browser

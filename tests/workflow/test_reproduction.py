@@ -2,7 +2,7 @@
 
 import subprocess
 
-from vinsar import pipeline
+from vinsar.study import pipeline
 
 CONFIG = ("--configfile", "tiny.yaml")
 

@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from vinsar import accuracy, claims, figures, pipeline, storage, validation
+from vinsar import figures
+from vinsar.evaluation import accuracy
+from vinsar.paper import claims
+from vinsar.results import storage
+from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 OF_SWEEPS = {"figure_fig5", "figure_snr"}

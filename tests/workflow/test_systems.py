@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from vinsar import pipeline, validation
+from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 ARRAY = """

@@ -5,18 +5,14 @@ from functools import cache, partial
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
-from vinsar import config as vinsar_config
-from vinsar import (
-    claims,
-    figures,
-    ingest,
-    pipeline,
-    provenance,
-    sweep,
-    systems,
-    validation,
-)
+from vinsar import figures
 from vinsar import report as study_report
+from vinsar.paper import claims
+from vinsar.prediction import systems
+from vinsar.results import provenance
+from vinsar.study import config as vinsar_config
+from vinsar.study import ingest, pipeline, validation
+from vinsar.sweeps import sweep
 
 try:
     STUDY = ingest.check(config)
@@ -46,7 +42,8 @@ def sources_of(*modules, script):
     """The files that a job runs: its script and, what Snakemake does not follow, the library."""
     # The bytes of a result depend on how it is stored, too.
     library = [
-        os.path.relpath(path) for path in provenance.sources_of(*modules, "storage")
+        os.path.relpath(path)
+        for path in provenance.sources_of(*modules, "results.storage")
     ]
     return [*library, f"workflow/scripts/{script}.py", "workflow/scripts/job.py"]
 

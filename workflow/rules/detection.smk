@@ -40,7 +40,7 @@ rule detection_accuracy:
 rule detection_summary:
     input:
         **sweep_files("roughness"),
-        code=sources_of("detection_accuracy", script="detection_summary"),
+        code=sources_of("evaluation.detection_accuracy", script="detection_summary"),
     output:
         report(
             "<results>/detection.md",

@@ -53,7 +53,7 @@ rule baseline_angle:
 rule accuracy_summary:
     input:
         accuracy="<results>/accuracy.nc",
-        code=sources_of("accuracy", script="accuracy_summary"),
+        code=sources_of("evaluation.accuracy", script="accuracy_summary"),
     output:
         report(
             "<results>/accuracy.json",

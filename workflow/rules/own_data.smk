@@ -5,7 +5,7 @@ if "elevation" in pipeline.from_files(STUDY):
     rule elevation:
         input:
             file=STUDY.scene.file,
-            code=sources_of("ingest", script="ingest"),
+            code=sources_of("study.ingest", script="ingest"),
         output:
             "<results>/elevation.nc",
         log:
@@ -31,7 +31,7 @@ if STUDY.measurement.file is not None:
     rule measurement:
         input:
             file=STUDY.measurement.file,
-            code=sources_of("ingest", script="ingest"),
+            code=sources_of("study.ingest", script="ingest"),
         output:
             **product_files(*pipeline.MEASURED),
         log:

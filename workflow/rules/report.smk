@@ -5,7 +5,7 @@ rule claims:
     input:
         **product_files(*claims.INPUTS),
         **sweep_files(*claims.SWEEPS),
-        code=sources_of("claims", script="claims"),
+        code=sources_of("paper.claims", script="claims"),
     output:
         json=report(
             "<results>/claims.json",
@@ -26,7 +26,7 @@ rule claims:
 rule variants:
     input:
         **own_heights(),
-        code=if_made("accuracy", sources_of("variants", script="variants")),
+        code=if_made("accuracy", sources_of("sweeps.variants", script="variants")),
     output:
         report(
             "<results>/variants.md",
@@ -82,7 +82,7 @@ rule report:
 
 rule design:
     input:
-        code=sources_of("design", script="design"),
+        code=sources_of("prediction.design", script="design"),
     output:
         "<results>/design.md",
     log:
@@ -98,7 +98,7 @@ rule design:
 rule systems:
     input:
         **sweep_files(systems.SWEEP),
-        code=sources_of("systems", script="systems"),
+        code=sources_of("prediction.systems", script="systems"),
     output:
         report(
             "<results>/systems.md",

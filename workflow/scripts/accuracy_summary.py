@@ -4,7 +4,8 @@ import json
 
 from job import job, read_products
 
-from vinsar import accuracy, storage
+from vinsar.evaluation import accuracy
+from vinsar.results import storage
 
 with job(snakemake):
     summary = accuracy.summary(read_products(snakemake)["accuracy"])

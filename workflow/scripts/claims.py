@@ -4,7 +4,9 @@ import json
 
 from job import job, read_products
 
-from vinsar import claims, config, storage
+from vinsar.paper import claims
+from vinsar.results import storage
+from vinsar.study import config
 
 with job(snakemake):
     study = config.Study.part(snakemake.params.configuration)

@@ -2,7 +2,9 @@
 
 from job import job
 
-from vinsar import design, storage, validation
+from vinsar.prediction import design
+from vinsar.results import storage
+from vinsar.study import validation
 
 with job(snakemake):
     sheet = design.Sheet(validation.check(snakemake.params.configuration))

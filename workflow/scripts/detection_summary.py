@@ -2,8 +2,10 @@
 
 from job import job, read_products
 
-from vinsar import config, detection_accuracy, storage
+from vinsar.evaluation import detection_accuracy
 from vinsar.figures import obstacles
+from vinsar.results import storage
+from vinsar.study import config
 
 with job(snakemake):
     study = config.Study.part(snakemake.params.configuration)

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from job import attributes, job, read_products
 
-from vinsar import config, figures
+from vinsar import figures
+from vinsar.study import config
 
 with job(snakemake):
     study = config.Study.part(snakemake.params.configuration)

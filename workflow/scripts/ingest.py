@@ -4,7 +4,8 @@ from pathlib import Path
 
 from job import attributes, job, stage_of
 
-from vinsar import config, ingest, storage
+from vinsar.results import storage
+from vinsar.study import config, ingest
 
 with job(snakemake):
     study = config.Study.part(snakemake.params.configuration)

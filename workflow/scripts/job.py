@@ -12,7 +12,8 @@ from pathlib import Path
 import dask
 import psutil
 
-from vinsar import lineage, provenance, storage, sweep
+from vinsar.results import lineage, provenance, storage
+from vinsar.sweeps import sweep
 
 
 @contextmanager

@@ -6,7 +6,9 @@ from pathlib import Path
 import yaml
 from job import attributes, job, product_paths
 
-from vinsar import config, lineage, report, storage
+from vinsar import report
+from vinsar.results import lineage, storage
+from vinsar.study import config
 
 
 def sources():

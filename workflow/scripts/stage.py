@@ -2,7 +2,8 @@
 
 from job import attributes, job, read_products
 
-from vinsar import config, pipeline, storage
+from vinsar.results import storage
+from vinsar.study import config, pipeline
 
 with job(snakemake):
     study = config.Study.part(snakemake.params.configuration)

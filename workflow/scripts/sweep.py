@@ -7,7 +7,9 @@ from pathlib import Path
 from job import attributes, job, read_products
 from progress import Progress
 
-from vinsar import checkpoint, cluster, provenance, storage, sweep, validation
+from vinsar.results import provenance, storage
+from vinsar.study import validation
+from vinsar.sweeps import checkpoint, cluster, sweep
 
 
 def main():

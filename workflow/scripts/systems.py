@@ -2,7 +2,9 @@
 
 from job import job, read_products
 
-from vinsar import config, storage, systems
+from vinsar.prediction import systems
+from vinsar.results import storage
+from vinsar.study import config
 
 with job(snakemake):
     study = config.Study.part(snakemake.params.configuration)

@@ -2,7 +2,9 @@
 
 from job import job, read_products
 
-from vinsar import storage, validation, variants
+from vinsar.results import storage
+from vinsar.study import validation
+from vinsar.sweeps import variants
 
 with job(snakemake):
     table = variants.as_markdown(

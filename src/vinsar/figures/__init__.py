@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from vinsar import design, validation
 from vinsar.figures import (
     acquisition,
     baselines,
@@ -29,14 +28,16 @@ from vinsar.figures import (
 )
 from vinsar.figures.files import save
 from vinsar.figures.style import colormap
+from vinsar.prediction import design
+from vinsar.study import validation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
     import matplotlib.figure
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 __all__ = ["FIGURES", "Figure", "check", "colormap", "save"]
 
@@ -50,7 +51,7 @@ class Figure:
     draw
         From the products and the study to the figure.
     inputs
-        Products that it reads, keys of `vinsar.pipeline.STAGES`.
+        Products that it reads, keys of `vinsar.study.pipeline.STAGES`.
     sections
         Parts of the configuration that it reads, and no others.
     sweeps

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import geometry, radar
 from vinsar.figures import style
+from vinsar.radar import geometry, waveform
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.patches import Rectangle
     from numpy.typing import NDArray
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 _GROUND, _SCENE, _VEHICLE = "#b8a98f", "#9fc2a2", "#dfe2e5"
 _DIMENSION = {
@@ -374,7 +374,7 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         The radar; then, after an empty row, what follows for the target T.
     """
     scheme, options = layout(study), study.radar
-    wavelength = radar.wavelength((options.start_frequency_hz + options.stop_frequency_hz) / 2)
+    wavelength = waveform.wavelength((options.start_frequency_hz + options.stop_frequency_hz) / 2)
     bandwidth = options.stop_frequency_hz - options.start_frequency_hz
     r1, r2 = scheme.ranges
     along, across = geometry.baseline_components(scheme.baseline, scheme.beta, scheme.look)
@@ -382,7 +382,7 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         r1, wavelength, scheme.baseline, scheme.beta, scheme.look
     )
     positions = round(options.aperture_length_m / options.position_spacing_m) + 1
-    azimuth = radar.azimuth_resolution(wavelength, r1, options.aperture_length_m)
+    azimuth = waveform.azimuth_resolution(wavelength, r1, options.aperture_length_m)
     if options.system == "rail":
         antennas = [
             ("aperture $L$", f"{options.aperture_length_m:g} m"),
@@ -404,7 +404,7 @@ def values(study: config.Study) -> list[tuple[str, str]]:
             f"{options.start_frequency_hz / 1e9:g} … {options.stop_frequency_hz / 1e9:g} GHz",
         ),
         (r"wavelength $\lambda$", f"{1000 * wavelength:.1f} mm"),
-        ("slant-range resolution", f"{100 * radar.range_resolution(bandwidth):.1f} cm"),
+        ("slant-range resolution", f"{100 * waveform.range_resolution(bandwidth):.1f} cm"),
         *antennas,
         ("baseline $B$", f"{scheme.baseline:g} m"),
         (r"baseline angle $\beta$", f"{options.baseline_angle_deg:g}°"),

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import baseline, config, variables
 from vinsar.figures import maps, style, sweeps
+from vinsar.foundations import variables
+from vinsar.radar import baseline
+from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.pipeline import Products
+    from vinsar.study.pipeline import Products
 
     Floats = NDArray[np.floating]
 

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar import baseline, variables
 from vinsar.figures import acquisition, baselines, sweeps
+from vinsar.foundations import variables
+from vinsar.radar import baseline
 
 if TYPE_CHECKING:
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 
 def acquisition_geometry(products: Products, study: config.Study) -> str:

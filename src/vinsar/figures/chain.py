@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 _HEIGHT_STEP_M = 0.05
 # Facets along the longer side of the surface; more are too small to tell apart on paper.

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar import variables
 from vinsar.figures import style, sweeps
+from vinsar.foundations import variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
     Floats = NDArray[np.floating]
 

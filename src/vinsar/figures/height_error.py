@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 _REGIONS = {"whole_scene": "whole scene", "visible_ground": "visible ground", "shadow": "shadow"}
 _BINS_PER_TOLERANCE = 10

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import motion, scene, variables
 from vinsar.figures import style, sweeps
+from vinsar.foundations import variables
+from vinsar.radar import motion
+from vinsar.simulation import scene
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
     Floats = NDArray[np.floating]
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vinsar import baseline, config, variables
 from vinsar.figures import style, sweeps
+from vinsar.foundations import variables
+from vinsar.radar import baseline
+from vinsar.study import config
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from vinsar.pipeline import Products
+    from vinsar.study.pipeline import Products
 
 _PARTS = (
     ("std", "whole_scene", 1.0, sweeps.WHOLE),

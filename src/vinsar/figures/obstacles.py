@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import config, detection, detection_accuracy, variables
+from vinsar.evaluation import detection_accuracy
 from vinsar.figures import maps, style, sweeps
+from vinsar.foundations import variables
+from vinsar.processing import detection
+from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.pipeline import Products
+    from vinsar.study.pipeline import Products
 
 SWEEP = "roughness"
 """The sweep that `draw_roc` shows."""

@@ -6,16 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import config, design, variables
-from vinsar.constants import AXES
 from vinsar.figures import style, sweeps
+from vinsar.foundations import variables
+from vinsar.foundations.constants import AXES
+from vinsar.prediction import design
+from vinsar.study import config
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.pipeline import Products
+    from vinsar.study.pipeline import Products
 
     Floats = NDArray[np.floating]
 

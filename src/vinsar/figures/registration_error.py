@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 # A tenth of a resolution cell is what the paper allows without registration (section 1.3).
 _ALLOWED_SHARE = 0.1

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 INPUTS = tuple(
     dict.fromkeys((*(name for letter in "acfh" for name in chain.panel_inputs(letter)), "accuracy"))

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import config, radar, trajectory
 from vinsar.figures import style
+from vinsar.radar import trajectory, waveform
+from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -152,7 +153,7 @@ def looks(study: config.Study, sweep: str) -> float:
         config.swept_section(study, sweep, name)
         for name in ("radar", "scene", "imaging", "interferogram")
     )
-    cell = radar.ground_resolution(
+    cell = waveform.ground_resolution(
         trajectory.apertures(trajectory.planned(radar_))[0],
         (scene.x_min_m + scene.x_max_m) / 2,
         (scene.y_min_m + scene.y_max_m) / 2,

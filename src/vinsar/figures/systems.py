@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar import systems
 from vinsar.figures import style, sweeps
+from vinsar.prediction import systems
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar import config
-    from vinsar.pipeline import Products
+    from vinsar.study import config
+    from vinsar.study.pipeline import Products
 
 _REGIONS = (
     ("visible_ground", sweeps.Look("visible ground", style.BLUE, "none", "o")),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from vinsar import config
+    from vinsar.study import config
 
 _WIDTH_MM, _HEIGHT_MM = 42.0, 34.0
 _DPI = 170

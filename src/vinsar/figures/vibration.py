@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from vinsar import baseline, config, variables
 from vinsar.figures import style, sweeps
+from vinsar.foundations import variables
+from vinsar.radar import baseline
+from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.pipeline import Products
+    from vinsar.study.pipeline import Products
 
 _LOOKS = {
     "x": sweeps.Look("error along x (the rail)", style.BLUE, "-", "o"),

@@ -13,15 +13,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from vinsar.kernels.compiling import part
-from vinsar.kernels.lookup import (
-    FLAGS,
-    INTS,
-    LANES,
-    PADDING,
-    Emitter,
-    contiguous,
-    permutes,
-)
+from vinsar.kernels.lookup import FLAGS, INTS, LANES, PADDING, Emitter, contiguous, permutes
 
 
 def _window_adder(pairs: int) -> Any:

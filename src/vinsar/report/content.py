@@ -11,19 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar import baseline, config, lineage, pipeline, radar, trajectory
 from vinsar.figures import FIGURES, height_error, sweeps, thumbnails
+from vinsar.radar import baseline, trajectory, waveform
+from vinsar.results import lineage
+from vinsar.study import config, pipeline
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from vinsar.pipeline import Products
+    from vinsar.study.pipeline import Products
 
 SECTIONS = tuple(name for name in config.Study.model_fields if name not in {"dask", "variants"})
 """Parts of the configuration that the report shows: not where sweeps run, nor the variants."""
 
 VERDICTS = ("reproduced", "partly", "contradicted", "undecided")
-"""Verdicts on claims, as `vinsar.claims` has them."""
+"""Verdicts on claims, as `vinsar.paper.claims` has them."""
 
 # Keys of the section `radar` that mean nothing for a cart on a rail.
 _OF_ARRAYS = {"transmitter_x_m", "transmitter_y_m", "transmitter_height_m", "dwell_s"}
@@ -180,9 +182,9 @@ class Sources:
     captions
         What each figure shows, by name.
     records
-        Records of the results, as `vinsar.lineage.read_records` returns them.
+        Records of the results, as `vinsar.results.lineage.read_records` returns them.
     claims
-        The claims as `vinsar.claims.as_json` gives them, if the study has them.
+        The claims as `vinsar.paper.claims.as_json` gives them, if the study has them.
     errata
         The errata as Markdown, of which the report shows the table.
     """
@@ -347,19 +349,19 @@ def quantities(study: config.Study) -> list[tuple[str, str, str]]:
     """
     options = study.radar
     seen = _middle(study)
-    frequency = radar.frequencies(
+    frequency = waveform.frequencies(
         options.start_frequency_hz, options.stop_frequency_hz, options.frequency_count
     )
     antennas = trajectory.planned(options)
     lower = trajectory.apertures(antennas)[0]
-    cell = radar.ground_resolution(lower, seen.x_m, seen.y_m, frequency=frequency)
+    cell = waveform.ground_resolution(lower, seen.x_m, seen.y_m, frequency=frequency)
     across = float(seen.across(options.baseline_m))
     ambiguity = float(seen.height_of_ambiguity(options.baseline_m))
     step = float(frequency[1] - frequency[0])
     return [
         ("wavelength of the carrier, λ", f"{1000 * seen.wavelength_m:.2f}", "mm"),
         ("frequency step", f"{step / 1e6:g}", "MHz"),
-        ("unambiguous range", f"{radar.unambiguous_range(step):.2f}", "m"),
+        ("unambiguous range", f"{waveform.unambiguous_range(step):.2f}", "m"),
         ("antenna positions", f"{antennas.sizes['position']}", ""),
         ("slant-range resolution", f"{100 * seen.range_resolution_m:.2f}", "cm"),
         ("resolution on the ground in x", f"{100 * float(cell[0]):.1f}", "cm"),

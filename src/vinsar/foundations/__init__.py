@@ -1,0 +1,1 @@
+"""What every wing stands on: sections of the configuration, variables, stages, files."""

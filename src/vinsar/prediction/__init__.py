@@ -1,0 +1,1 @@
+"""What a configuration will do, without running it."""

@@ -1,0 +1,119 @@
+"""The antenna arrangements side by side: resolution, height of ambiguity, accuracy, scan time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar.foundations import variables
+from vinsar.foundations.constants import CHANNELS
+from vinsar.radar import aperture, trajectory, waveform
+from vinsar.study import config
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SWEEP = "systems"
+"""The sweep that the comparison is made from; it goes over the section ``radar`` alone."""
+
+_NAMES = {"rail": "rail", "transmit_pair": "transmit pair", "receive_pair": "receive pair"}
+
+
+@dataclass(frozen=True)
+class System:
+    """An antenna arrangement and what it achieves.
+
+    Attributes
+    ----------
+    name
+        Arrangement and length.
+    positions
+        Antenna positions, or elements of an array.
+    resolution_m
+        Resolution in x and y at the scene's middle, on the ground, m.
+    height_of_ambiguity_m
+        Height that turns the phase by a cycle there, m.
+    scan_time_s
+        Time for the aperture: the cart's run along the rail, or the array's frequency sweeps, s.
+    accuracy
+        Product ``sweep`` of this arrangement: its statistics by region and realization.
+    """
+
+    name: str
+    positions: int
+    resolution_m: tuple[float, float]
+    height_of_ambiguity_m: float
+    scan_time_s: float
+    accuracy: xr.Dataset
+
+
+def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
+    """Return the arrangements of the sweep `SWEEP`, in its order.
+
+    Parameters
+    ----------
+    sweep
+        The sweep's dataset.
+    study
+        The study, with ``radar``, ``scene``, ``vehicle`` and ``sweeps``.
+
+    Returns
+    -------
+    list of System
+        An arrangement each.
+    """
+    over = study.sweeps[SWEEP].over
+    if list(over) != ["radar"]:
+        raise ValueError(f"the sweep '{SWEEP}' goes over {', '.join(over)}; radar alone is needed")
+    common = config.swept_section(study, SWEEP, "radar")
+    scene = config.swept_section(study, SWEEP, "scene")
+    statistics = variables.swept(sweep, "radar")
+    found = []
+    for number, changes in enumerate(over["radar"]):
+        radar_ = common.model_copy(update=changes)
+        lower, upper = trajectory.apertures(trajectory.planned(radar_))
+        frequency = np.array([radar_.start_frequency_hz, radar_.stop_frequency_hz])
+        middle = (scene.x_min_m + scene.x_max_m) / 2, (scene.y_min_m + scene.y_max_m) / 2
+        across, ahead = waveform.ground_resolution(lower, *middle, frequency=frequency)
+        wavelength = waveform.wavelength(waveform.carrier(frequency))
+        positions = round(radar_.aperture_length_m / radar_.position_spacing_m) + 1
+        samples = len(CHANNELS) * positions * radar_.frequency_count
+        found.append(
+            System(
+                name=f"{_NAMES[radar_.system]}, {radar_.aperture_length_m:g} m",
+                positions=positions,
+                resolution_m=(float(across), float(ahead)),
+                height_of_ambiguity_m=float(
+                    aperture.height_of_ambiguity(lower, upper, *middle, wavelength)
+                ),
+                scan_time_s=trajectory.scan_duration(radar_, study.vehicle, samples),
+                accuracy=statistics.isel(radar=number),
+            )
+        )
+    return found
+
+
+def as_markdown(found: list[System]) -> str:
+    """Return the comparison as a Markdown table, means over the realizations."""
+    lines = [
+        "| system | positions | resolution in x, y | height of ambiguity | scan time "
+        "| within tolerance | std | visible: within tolerance | visible: std |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for system in found:
+        across, ahead = system.resolution_m
+        statistics = system.accuracy.mean("realization")
+        accuracy = " | ".join(
+            f"{100 * float(part['fraction_within_tolerance']):.1f} % "
+            f"| {100 * float(part['std']):.2f} cm"
+            for part in (
+                statistics.sel(region=region) for region in ("whole_scene", "visible_ground")
+            )
+        )
+        lines.append(
+            f"| {system.name} | {system.positions} | {100 * across:.1f} cm, {100 * ahead:.1f} cm "
+            f"| {system.height_of_ambiguity_m:.3f} m | {system.scan_time_s:.3g} s | {accuracy} |"
+        )
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,1 @@
+"""From echoes to heights, without the truth."""

@@ -1,0 +1,268 @@
+"""Obstacles and holes: alarms on the reconstructed heights, and on an image alone beside it.
+
+Heights tell what rises above the ground or falls below it. Where the image is dark, or the height
+too noisy to tell, the ground is unknown, not free. The 2-D detector is what a radar without
+interferometry has: what is brighter than its surroundings.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar.foundations import variables
+from vinsar.processing import height
+from vinsar.radar import aperture, baseline, geometry, trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from vinsar.study import config
+
+    Flags = NDArray[np.bool_]
+    Floats = NDArray[np.floating]
+
+logger = logging.getLogger(__name__)
+
+FREE, OBSTACLE, HOLE, UNKNOWN = 0, 1, 2, 3
+"""Classes of a cell of the map."""
+
+# Running medians are taken at so many nodes along the side of their window.
+_NODES = 12
+
+# Height that is representative of an area: what a tenth of its cells exceed.
+_PERCENTILE = 90
+
+# Step of the phase to differentiate by, rad.
+_PHASE_STEP = 1e-3
+
+# Below it a coherence says no more than that there is none.
+_LEAST_COHERENCE = 1e-2
+
+# Residuals below this do not gain weight in the fit of the ground, m.
+_LEAST_RESIDUAL_M = 1e-3
+
+
+def regions(alarm: Flags, least_cells: float) -> tuple[NDArray[np.integer], int]:
+    """Return the connected areas of a mask that are large enough.
+
+    Parameters
+    ----------
+    alarm
+        Mask (y, x); cells that touch at a corner are connected.
+    least_cells
+        Number of cells that an area must have.
+
+    Returns
+    -------
+    areas
+        Number of the area from 1, or 0 (y, x).
+    count
+        How many areas there are.
+    """
+    from scipy.ndimage import label
+
+    areas, _ = label(alarm, np.ones((3, 3)))
+    size = np.bincount(areas.ravel())
+    kept = size > least_cells - 1e-6
+    kept[0] = False
+    number = np.where(kept, np.cumsum(kept), 0)
+    return number[areas], int(kept.sum())
+
+
+def _window(length_m: float, spacing_m: float) -> int:
+    """Return an odd number of pixels of about this length."""
+    return 2 * max(0, round(length_m / spacing_m / 2 - 0.5)) + 1
+
+
+def running_median(values: Floats, window_px: int) -> Floats:
+    """Return the median around each cell, without the cells that are not a number.
+
+    It is taken at a few nodes a window and interpolated between them.
+
+    Parameters
+    ----------
+    values
+        Values (y, x).
+    window_px
+        Side of the square window; at the edges it covers what there is.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Medians; where a window has no value, the median of all.
+    """
+    from scipy.ndimage import map_coordinates
+
+    step = max(1, window_px // _NODES)
+    half = window_px // 2
+    rows, columns = (np.arange(0, size - 1 + step, step) for size in values.shape)
+    medians = np.empty((rows.size, columns.size))
+    everywhere = values[np.isfinite(values)]
+    default = np.median(everywhere) if everywhere.size else np.nan
+    for i, row in enumerate(rows):
+        strip = values[max(0, row - half) : row + half + 1]
+        for j, column in enumerate(columns):
+            part = strip[:, max(0, column - half) : column + half + 1]
+            known = part[np.isfinite(part)]
+            medians[i, j] = np.median(known) if known.size else default
+    places = np.indices(values.shape) / step
+    return np.asarray(map_coordinates(medians, places, order=1, mode="nearest"))
+
+
+def ground(heights: Floats, x: Floats, y: Floats, window_m: float | None) -> Floats:
+    """Return the ground beneath obstacles, from the heights themselves.
+
+    A plane by least absolute deviations, which objects here and there do not bend, and on request
+    the running median of what is left, for ground that rolls.
+
+    Parameters
+    ----------
+    heights
+        Heights (y, x), m; NaN where unknown.
+    x, y
+        Axes, m.
+    window_m
+        Side of the running median's window, m; None for the plane alone.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Heights of the ground, m.
+
+    Raises
+    ------
+    ValueError
+        If fewer than three heights are known.
+    """
+    known = np.isfinite(heights)
+    if known.sum() < 3:
+        raise ValueError(
+            "fewer than three cells have a height that is not in the dark: there is no ground to "
+            "find obstacles on; try a lower detection.shadow_level_db"
+        )
+    row, column = np.nonzero(known)
+    constant, slope_x, slope_y = geometry.fit_plane(
+        x[column], y[row] - y[0], heights[known], least_residual=_LEAST_RESIDUAL_M
+    )
+    plane = constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0])
+    if window_m is None:
+        return np.asarray(plane)
+    return np.asarray(plane + running_median(heights - plane, _window(window_m, x[1] - x[0])))
+
+
+def _ratio(decibel: float) -> float:
+    return float(10 ** (decibel / 10))
+
+
+def _located(dem: xr.Dataset, images: xr.Dataset) -> tuple[Floats, Floats, Floats]:
+    """Return where the image's pixels belong, and how their height changes with the phase.
+
+    Returns
+    -------
+    tuple of ndarray, shape (y, x)
+        x and y, m; height by phase, m/rad.
+    """
+    x, y = dem["x"].values[None, :], dem["y"].values[:, None]
+    lower, upper = trajectory.apertures(images)
+    wavelength, phase = float(images["wavelength"]), dem["absolute_phase"].values
+    true_x, true_y, here = aperture.locate(lower, upper, x, y, phase, wavelength)
+    *_, higher = aperture.locate(lower, upper, x, y, phase + _PHASE_STEP, wavelength)
+    return true_x, true_y, (higher - here) / _PHASE_STEP
+
+
+def detect(
+    dem: xr.Dataset,
+    images: xr.Dataset,
+    interferogram: xr.Dataset,
+    *,
+    options: config.Detection,
+    looks: float,
+) -> xr.Dataset:
+    """Find obstacles and holes.
+
+    Parameters
+    ----------
+    dem, images, interferogram
+        Products of these names.
+    options
+        Section ``detection`` of the configuration.
+    looks
+        Independent looks of the coherence.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``detections``.
+    """
+    from scipy.ndimage import uniform_filter
+
+    x, y = dem["x"].values, dem["y"].values
+    spacing = float(x[1] - x[0])
+    true_x, true_y, height_by_phase = _located(dem, images)
+
+    def coded(values: Floats) -> Floats:
+        return height.code_dem(np.asarray(values, float), x, y, true_x=true_x, true_y=true_y)
+
+    window = _window(options.multilook_window_m, spacing)
+    power = (np.abs(images["image"].values) ** 2).mean(axis=0)
+    intensity = uniform_filter(power, window, mode="nearest")
+    surroundings = running_median(intensity, _window(options.background_window_m, spacing))
+    contrast = intensity / np.maximum(surroundings, np.finfo(float).tiny)
+    found = dem["height"].values
+    least = options.minimum_area_m2 / spacing**2
+    # Speckle has dark spots of its own.
+    shaded, _ = regions(contrast < _ratio(options.shadow_level_db), least)
+    dark = ~(coded(np.where(shaded > 0, 1.0, 0.0)) < 0.5) | ~np.isfinite(found)
+    coherence = np.clip(interferogram["coherence"].values, _LEAST_COHERENCE, 1)
+    # The Cramer-Rao bound of the phase.
+    noise = coded(np.abs(height_by_phase) * baseline.phase_std(coherence, looks))
+    surface = ground(np.where(dark, np.nan, found), x, y, options.ground_window_m)
+    residual = found - surface
+    certain = ~dark & (np.abs(residual) > options.noise_factor * noise)
+    # What is not certain is no alarm at any threshold.
+    significant = np.where(dark, np.nan, np.where(certain, residual, 0.0))
+    above, raised = regions(significant > options.threshold_m, least)
+    below, sunk = regions(significant < -options.threshold_m, least)
+    kind = np.full(found.shape, FREE, np.int8)
+    kind[dark | (options.noise_factor * noise > options.threshold_m)] = UNKNOWN
+    kind[above > 0], kind[below > 0] = OBSTACLE, HOLE
+    bright, count = regions(contrast > _ratio(options.amplitude_threshold_db), least)
+    logger.info("%d obstacles, %d holes; %d alarms of the image alone", raised, sunk, count)
+    areas = [above == number + 1 for number in range(raised)]
+    areas += [below == number + 1 for number in range(sunk)]
+    table = np.array([_describe(area, residual, x, y) for area in areas]).reshape(-1, 6)
+    names = ("detected_x", "detected_y", "extent_x", "extent_y", "detected_area", "detected_height")
+    return variables.dataset(
+        "detections",
+        {
+            "ground": surface,
+            "height_above_ground": residual,
+            "height_noise": noise,
+            "significant_height": significant,
+            "map_class": kind,
+            "contrast": contrast,
+            "bright": bright > 0,
+        }
+        | dict(zip(names, table.T, strict=True)),
+        {"x": x, "y": y},
+    )
+
+
+def _describe(area: Flags, residual: Floats, x: Floats, y: Floats) -> tuple[float, ...]:
+    """Return centre, extent, area and height of an area."""
+    row, column = np.nonzero(area)
+    values = residual[area]
+    sign = 1.0 if values[0] > 0 else -1.0
+    spacing = float(x[1] - x[0])
+    return (
+        float(x[column].mean()),
+        float(y[row].mean()),
+        float(np.ptp(x[column])) + spacing,
+        float(np.ptp(y[row])) + spacing,
+        row.size * spacing**2,
+        sign * float(np.percentile(sign * values, _PERCENTILE)),
+    )

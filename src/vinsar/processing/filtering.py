@@ -1,0 +1,166 @@
+"""Filters of the interferometric phase."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from vinsar.foundations import blocks, variables
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Complexes = NDArray[np.complexfloating]
+
+FilterName = Literal["goldstein", "boxcar", "none"]
+
+# Patches in one batch of transforms: 4 MB, so that they stay in the cache.
+_PIXELS_PER_BATCH = 500_000
+
+
+def goldstein(
+    interferogram: Complexes, *, alpha: float, patch_px: int, step_px: int
+) -> NDArray[np.complex64]:
+    """Filter with the patch's own spectrum, raised to a power (Goldstein and Werner, 1998).
+
+    Overlapping patches are transformed, multiplied with their magnitude spectrum, smoothed by
+    3 x 3, to the power alpha, transformed back and added up with a tapered weight. Outside the
+    interferogram there are zeros, which weigh nothing.
+
+    Parameters
+    ----------
+    interferogram
+        Complex interferogram (y, x).
+    alpha
+        Strength, 0 (none) to 1.
+    patch_px
+        Side of a patch, pixels.
+    step_px
+        Step between patches, pixels; it divides the side and is at most half of it.
+
+    Returns
+    -------
+    ndarray, shape (y, x), complex64
+        Filtered interferogram.
+
+    Raises
+    ------
+    ValueError
+        If alpha is outside 0..1, or the step does not divide the patch at least twice.
+    """
+    from scipy import fft
+
+    from vinsar.kernels import patches as kernel
+
+    if not 0 <= alpha <= 1:
+        raise ValueError(f"Goldstein's alpha is {alpha}; take 0 to 1")
+    if step_px < 1 or patch_px % step_px or patch_px < 2 * step_px:
+        raise ValueError(
+            f"a step of {step_px} pixels must divide the patch of {patch_px} pixels twice or more"
+        )
+    rows, columns = interferogram.shape
+    # Every pixel lies in as many patches as every other.
+    lead = patch_px - step_px
+    down = -(-(rows + lead) // step_px)
+    across = -(-(columns + lead) // step_px)
+    padded = np.zeros(
+        (lead + down * step_px + patch_px, lead + across * step_px + patch_px), np.complex64
+    )
+    padded[lead : lead + rows, lead : lead + columns] = interferogram
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (patch_px, patch_px))
+    patches = windows[: down * step_px : step_px, : across * step_px : step_px]
+    taper = np.sin(np.pi * (np.arange(patch_px) + 0.5) / patch_px).astype(np.float32) ** 2
+    # Batches of rows of patches, each added up by itself: one result however many run at once.
+    batch = max(1, _PIXELS_PER_BATCH // (across * patch_px**2))
+
+    def work(begin: int) -> NDArray[np.complex64]:
+        block = patches[begin : begin + batch]
+        spectra = fft.fft2(block)
+        weights = np.empty(spectra.shape, np.float32)
+        kernel.smooth(spectra, weights)
+        np.power(weights, np.float32(alpha), out=weights)
+        spectra *= weights
+        band = np.zeros(((len(block) - 1) * step_px + patch_px, padded.shape[1]), np.complex64)
+        kernel.overlap_add(fft.ifft2(spectra, overwrite_x=True), taper, step_px, band)
+        return band
+
+    total = np.zeros_like(padded)
+    begins = range(0, down, batch)
+    for begin, band in zip(begins, blocks.run(work, ((n,) for n in begins)), strict=True):
+        total[begin * step_px : begin * step_px + len(band)] += band
+    # Tapers squared-sine at a step that divides the patch add up to a constant.
+    gain = (patch_px / (2 * step_px)) ** 2
+    return np.asarray(total[lead : lead + rows, lead : lead + columns] / gain, np.complex64)
+
+
+def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]:
+    """Average over a square window.
+
+    Parameters
+    ----------
+    interferogram
+        Complex interferogram (y, x).
+    window_px
+        Side of the window, pixels, odd.
+
+    Returns
+    -------
+    ndarray, shape (y, x), complex64
+        Filtered interferogram; at the edges, over what the window covers.
+
+    Raises
+    ------
+    ValueError
+        If the window is not odd and positive.
+    """
+    from scipy.ndimage import uniform_filter
+
+    if window_px < 1 or window_px % 2 == 0:
+        raise ValueError(f"the boxcar of {window_px} pixels must be odd and positive")
+    values = np.asarray(interferogram, np.complex128)
+    sums = uniform_filter(values, window_px, mode="constant")
+    covered = [uniform_filter(np.ones(size), window_px, mode="constant") for size in values.shape]
+    return np.asarray(sums / np.outer(*covered), np.complex64)
+
+
+def apply(
+    interferogram: xr.Dataset,
+    *,
+    method: FilterName,
+    goldstein_alpha: float,
+    goldstein_patch_px: int,
+    goldstein_step_px: int,
+    boxcar_window_px: int,
+) -> xr.Dataset:
+    """Filter an interferogram with the chosen filter.
+
+    Parameters
+    ----------
+    interferogram
+        Product ``interferogram``.
+    method
+        The filter; ``none`` passes the interferogram on.
+    goldstein_alpha, goldstein_patch_px, goldstein_step_px
+        As in `goldstein`.
+    boxcar_window_px
+        As in `boxcar`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``filtered``.
+    """
+    values = interferogram["interferogram"].values
+    if method == "goldstein":
+        values = goldstein(
+            values, alpha=goldstein_alpha, patch_px=goldstein_patch_px, step_px=goldstein_step_px
+        )
+    elif method == "boxcar":
+        values = boxcar(values, window_px=boxcar_window_px)
+    return variables.dataset(
+        "filtered",
+        {"interferogram": values},
+        {"x": interferogram["x"].values, "y": interferogram["y"].values},
+    )

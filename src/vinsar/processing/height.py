@@ -1,0 +1,215 @@
+"""From unwrapped phase to a digital elevation model: constant, inversion, DEM coding."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from vinsar.foundations import variables
+from vinsar.radar import aperture, geometry, trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+
+logger = logging.getLogger(__name__)
+
+Trend = Literal["constant", "plane"]
+Extent = tuple[float, float, float, float]
+
+# Residual below which a reference point gains no more weight in the fit of a plane, rad.
+_LEAST_RESIDUAL = 1e-3
+
+
+def level_ground(
+    x: Floats, y: Floats, rectangles: Sequence[Extent], height_m: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return the grid's points on ground that the user declares level.
+
+    Parameters
+    ----------
+    x, y
+        Axes of the grid, m.
+    rectangles
+        Extents (x_min, x_max, y_min, y_max), m.
+    height_m
+        Height of the level ground, m.
+
+    Returns
+    -------
+    tuple of ndarray
+        x, y and height of the points, m.
+
+    Raises
+    ------
+    ValueError
+        If no point of the grid is on the declared ground.
+    """
+    grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
+    inside = np.zeros(grid_x.shape, bool)
+    for x_min, x_max, y_min, y_max in rectangles:
+        inside |= (grid_x >= x_min) & (grid_x <= x_max) & (grid_y >= y_min) & (grid_y <= y_max)
+    if not inside.any():
+        raise ValueError("no pixel of the grid lies on the ground declared level")
+    return grid_x[inside], grid_y[inside], np.full(int(inside.sum()), height_m)
+
+
+def phase_offset(
+    unwrapped: xr.Dataset,
+    images: xr.Dataset,
+    points: tuple[Floats, Floats, Floats],
+    *,
+    trend: Trend = "constant",
+) -> Floats:
+    """Return the phase to add so that reference points come out at their known heights.
+
+    Unwrapping leaves one constant unknown. Each reference point tells it: its absolute phase is
+    known (Eq. 1), and so is the pixel where it is imaged. The constant is the median over points,
+    the plane a fit by least absolute deviations, so that single bad pixels do not count.
+
+    Parameters
+    ----------
+    unwrapped, images
+        Products of these names.
+    points
+        x, y and height of the reference points, m.
+    trend
+        What to fit.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Phase to add, rad.
+
+    Raises
+    ------
+    ValueError
+        If a reference point is imaged outside the grid, or there are too few for the trend.
+    """
+    from scipy.ndimage import map_coordinates
+
+    x, y = unwrapped["x"].values, unwrapped["y"].values
+    lower, upper = trajectory.apertures(images)
+    wavelength = float(images["wavelength"])
+    point_x, point_y, point_height = points
+    image_x, image_y = aperture.image_position(lower, point_x, point_y, point_height)
+    column = (image_x - x[0]) / (x[1] - x[0])
+    row = (image_y - y[0]) / (y[1] - y[0])
+    # A pixel's width of tolerance: declared ground may end at the image's edge.
+    inside = (row > -1) & (row < y.size) & (column > -1) & (column < x.size)
+    if not inside.all():
+        first = int(np.argmin(inside))
+        raise ValueError(
+            f"the reference point at x = {point_x[first]:.2f} m, y = {point_y[first]:.2f} m is "
+            "imaged outside the grid"
+        )
+    absolute = aperture.interferometric_phase(
+        lower, upper, point_x, point_y, point_height, wavelength
+    )
+    flat = aperture.flat_earth_phase(lower, upper, image_x, image_y, wavelength)
+    found = map_coordinates(unwrapped["phase"].values, [row, column], order=1, mode="nearest")
+    missing = absolute - flat - found
+    if trend == "constant":
+        return np.full((y.size, x.size), np.median(missing))
+    if len(missing) < 3:
+        raise ValueError(f"a plane needs three or more reference points, not {len(missing)}")
+    constant, slope_x, slope_y = geometry.fit_plane(
+        image_x, image_y - y[0], missing, least_residual=_LEAST_RESIDUAL
+    )
+    return np.asarray(constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0]))
+
+
+def code_dem(
+    image_height: Floats, x: Floats, y: Floats, *, true_x: Floats, true_y: Floats
+) -> Floats:
+    """Move the image's heights to their true positions and resample them to the grid.
+
+    The paper's DEM coding. The heights, and the true x, are interpolated linearly in y along each
+    column of the image, and then the heights in x along each row of the grid, where the true x are
+    not those of the columns. Where parts overlap (layover) they come in the order of y.
+
+    Parameters
+    ----------
+    image_height
+        Heights at the image's pixels (y, x), m.
+    x, y
+        Axes of image and DEM, m.
+    true_x, true_y
+        Where the pixels belong (y, x), m; NaN where that is not known.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Heights on the grid, m; NaN more than a pixel beyond the outermost known height.
+
+    Raises
+    ------
+    ValueError
+        If the heights are not on the axes.
+    """
+    from vinsar.kernels import columns
+
+    if image_height.shape != (y.size, x.size):
+        raise ValueError(
+            f"heights of shape {image_height.shape} are not on a grid of {(y.size, x.size)}"
+        )
+
+    result = np.empty(image_height.shape)
+    columns.resample(np.ascontiguousarray(image_height, float), true_y, y, result)
+    known = np.isfinite(true_y)
+    if np.array_equal(true_x[known], np.broadcast_to(x, known.shape)[known]):
+        return result
+    place = np.empty(image_height.shape)
+    columns.resample(np.ascontiguousarray(true_x, float), true_y, y, place)
+    rows = np.empty((x.size, y.size))
+    columns.resample(np.ascontiguousarray(result.T), np.ascontiguousarray(place.T), x, rows)
+    return np.ascontiguousarray(rows.T)
+
+
+def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Dataset:
+    """Invert the unwrapped phase to heights and code the DEM.
+
+    The flat-earth phase (Eq. 11), which focusing on the ground plane has removed, is added back;
+    `aperture.locate` gives the height and the true place of each pixel, and `code_dem` moves it
+    there.
+
+    Parameters
+    ----------
+    unwrapped, images
+        Products of these names.
+    offset
+        Phase to add (y, x), from `phase_offset`, rad.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``dem``.
+    """
+    x, y = unwrapped["x"].values, unwrapped["y"].values
+    lower, upper = trajectory.apertures(images)
+    wavelength = float(images["wavelength"])
+    flat = aperture.flat_earth_phase(lower, upper, x[None, :], y[:, None], wavelength)
+    absolute = unwrapped["phase"].values + flat + offset
+    true_x, true_y, image_height = aperture.locate(
+        lower, upper, x[None, :], y[:, None], absolute, wavelength
+    )
+    height = code_dem(image_height, x, y, true_x=true_x, true_y=true_y)
+    unknown = int(np.isnan(height).sum())
+    if unknown:
+        logger.info("%d of %d cells of the DEM have no height", unknown, height.size)
+    return variables.dataset(
+        "dem",
+        {
+            "height": height,
+            "image_height": image_height,
+            "absolute_phase": absolute,
+            "phase_offset": offset,
+        },
+        {"x": x, "y": y},
+    )

@@ -1,0 +1,158 @@
+"""Phase unwrapping: four published solvers behind one function, and the residues."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import cache
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from vinsar.foundations import variables
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+    Complexes = NDArray[np.complexfloating]
+
+UnwrapperName = Literal["whirlwind", "skimage", "kamui", "snaphu"]
+
+
+def residues(phase: Floats) -> NDArray[np.int8]:
+    """Return the winding number of the wrapped phase around every 2 x 2 cell.
+
+    Parameters
+    ----------
+    phase
+        Wrapped phase (y, x), rad.
+
+    Returns
+    -------
+    ndarray of int8, shape (y, x)
+        -1, 0 or 1; the last row and column, which begin no cell, hold 0.
+    """
+
+    def turns(difference: Floats) -> Floats:
+        return np.rint(difference / (2 * np.pi))
+
+    right, up = np.diff(phase, axis=1), np.diff(phase, axis=0)
+    right, up = right - 2 * np.pi * turns(right), up - 2 * np.pi * turns(up)
+    result = np.zeros(phase.shape, np.int8)
+    result[:-1, :-1] = turns(right[:-1] + up[:, 1:] - right[1:] - up[:, :-1])
+    return result
+
+
+@cache
+def _single_thread() -> None:
+    """Keep whirlwind to one thread: parallelism is Dask's."""
+    import whirlwind
+
+    # It refuses if another library or the user has decided before.
+    with suppress(RuntimeError):
+        whirlwind.set_num_threads(1)
+
+
+def _whirlwind(values: Complexes, coherence: Floats, looks: float) -> Floats:
+    import whirlwind
+
+    _single_thread()
+    # Low coherence rather than a mask: a mask would split the scene into pieces of unknown level.
+    unwrapped, _ = whirlwind.unwrap(
+        np.ascontiguousarray(values, np.complex64),
+        np.ascontiguousarray(np.maximum(coherence, 1e-3), np.float32),
+        looks,
+        mask=np.ones(values.shape, bool),
+        # Nothing is masked, so there is nothing to bridge, and its components are not used.
+        bridge=False,
+        conncomp_algorithm="linear",
+    )
+    return unwrapped
+
+
+def _skimage(values: Complexes, coherence: Floats, looks: float) -> Floats:
+    del coherence, looks  # It weighs paths by the phase itself.
+    from skimage.restoration import unwrap_phase
+
+    return np.asarray(unwrap_phase(np.angle(values).astype(float), rng=0))
+
+
+def _kamui(values: Complexes, coherence: Floats, looks: float) -> Floats:
+    del looks
+    import kamui
+
+    # Whole numbers let it take its network solver.
+    weights = np.rint(1 + 99 * coherence).astype(int)
+    unwrapped = kamui.unwrap_dimensional(
+        np.angle(values).astype(float), method="ilp", weights=weights
+    )
+    if unwrapped is None:
+        raise ValueError("kamui found no unwrapping; try `unwrapping.method: whirlwind`")
+    return np.asarray(unwrapped)
+
+
+def _snaphu(values: Complexes, coherence: Floats, looks: float) -> Floats:
+    try:
+        import snaphu
+    except ImportError:
+        raise ValueError(
+            "snaphu is not installed, as its solver is free for non-commercial use only; install "
+            "it into .venv with pip (package `snaphu`), or take `unwrapping.method: whirlwind`"
+        ) from None
+    unwrapped, _ = snaphu.unwrap(
+        values.astype(np.complex64), coherence.astype(np.float32), nlooks=looks, cost="smooth"
+    )
+    return np.asarray(unwrapped)
+
+
+_UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float], Floats]] = {
+    "whirlwind": _whirlwind,
+    "skimage": _skimage,
+    "kamui": _kamui,
+    "snaphu": _snaphu,
+}
+
+
+def unwrap(
+    filtered: xr.Dataset, coherence: xr.DataArray, *, method: UnwrapperName, looks: float
+) -> xr.Dataset:
+    """Unwrap the filtered phase.
+
+    Parameters
+    ----------
+    filtered
+        Product ``filtered``.
+    coherence
+        Coherence (y, x), which weights what may be cut.
+    method
+        The unwrapper. Whatever it is, each pixel comes out as its wrapped phase plus whole cycles.
+    looks
+        Effective number of independent looks of the coherence, at least 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``unwrapped``.
+
+    Raises
+    ------
+    ValueError
+        If the method is unknown or not installed.
+    """
+    if method not in _UNWRAPPERS:
+        raise ValueError(f"no unwrapper '{method}'; there are {', '.join(_UNWRAPPERS)}")
+    values = filtered["interferogram"].values
+    wrapped = np.angle(values).astype(float)
+    unwrapped = _UNWRAPPERS[method](values, coherence.values, looks).astype(float)
+    # Solvers work in single precision and from any level: keep only their whole cycles.
+    added = unwrapped - wrapped
+    level = np.angle(np.exp(1j * added).mean())
+    cycles = np.rint((added - level) / (2 * np.pi))
+    return variables.dataset(
+        "unwrapped",
+        {"phase": wrapped + 2 * np.pi * cycles, "residue": residues(wrapped)},
+        {"x": filtered["x"].values, "y": filtered["y"].values},
+    )

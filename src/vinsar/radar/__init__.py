@@ -1,0 +1,1 @@
+"""The radar: waveform, antennas, geometry, aperture, motion."""

@@ -1,0 +1,301 @@
+"""The vehicle's motion during the scan, position errors, and what both do to the focus (Fig. 5).
+
+While the cart crosses the aperture at the speed ``u`` the vehicle drives ahead at ``v``: the
+positions lie on a line turned by the yaw angle ``atan(v / u)`` (section 1).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from vinsar.foundations import variables
+from vinsar.foundations.constants import AXES, SPEED_OF_LIGHT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.floating]
+
+AxisName = Literal["x", "y", "z"]
+Distribution = Literal["uniform", "normal"]
+Spectrum = Literal["white", "sinusoidal", "random_walk"]
+
+
+def errors(
+    positions: int,
+    *,
+    std_m: float,
+    distribution: Distribution,
+    spectrum: Spectrum,
+    cycles_per_aperture: float,
+    rng: np.random.Generator,
+) -> Floats:
+    """Draw the position errors of one antenna along one axis.
+
+    Parameters
+    ----------
+    positions
+        Number of antenna positions.
+    std_m
+        Standard deviation of the errors, m: of each error for ``white``, over a period for
+        ``sinusoidal``, over the aperture for ``random_walk``.
+    distribution
+        Of the errors (``white``) or of the steps (``random_walk``); a uniform error has the
+        half-width ``sqrt(3) std``.
+    spectrum
+        ``white``: independent from position to position, as in the paper; ``sinusoidal``: one
+        vibration of random phase; ``random_walk``: drift, the sum of independent steps.
+    cycles_per_aperture
+        Frequency of the sinusoid, in periods over the aperture.
+    rng
+        Source of randomness; the draw scales with the standard deviation and changes in nothing
+        else with it.
+
+    Returns
+    -------
+    ndarray, shape (position,)
+        Errors, m.
+    """
+    if spectrum == "sinusoidal":
+        phase = 2 * np.pi * rng.random()
+        turns = cycles_per_aperture * np.linspace(0, 1, positions)
+        return std_m * np.sqrt(2) * np.sin(2 * np.pi * turns + phase)
+    if distribution == "uniform":
+        unit = np.sqrt(3) * rng.uniform(-1, 1, positions)
+    else:
+        unit = rng.standard_normal(positions)
+    if spectrum == "random_walk":
+        # The variance grows with the steps; its mean over the aperture is (positions + 1) / 2.
+        unit = np.cumsum(unit) / np.sqrt((positions + 1) / 2)
+    return std_m * unit
+
+
+def displace(
+    trajectory: xr.Dataset, *, axis: AxisName, draw: Callable[[int, int], Floats]
+) -> xr.Dataset:
+    """Displace a trajectory's antennas along one axis, transmitter and receiver alike.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``.
+    axis
+        Axis of the displacement.
+    draw
+        From a channel's number and the number of positions to errors (position,), m.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory`` with other positions.
+    """
+    antennas = {name: trajectory[name].values.copy() for name in ("transmitter", "receiver")}
+    channels, positions, _ = antennas["transmitter"].shape
+    for channel in range(channels):
+        shift = draw(channel, positions)
+        for values in antennas.values():
+            values[channel, :, AXES.index(axis)] += shift
+    return variables.dataset("trajectory", antennas, {"channel": trajectory["channel"].values})
+
+
+def slope(speed_m_per_s: ArrayLike, *, aperture_length_m: float, duration_s: float) -> Floats:
+    """Return how far the vehicle drives for each metre of the scan: the tangent of the yaw angle.
+
+    Parameters
+    ----------
+    speed_m_per_s
+        Speed ``v`` of the vehicle, m/s.
+    aperture_length_m, duration_s
+        Length of the aperture at rest, m, and time for it, s; ``u`` is their ratio.
+
+    Returns
+    -------
+    ndarray
+        ``v / u``, 1.
+    """
+    return np.asarray(speed_m_per_s) * duration_s / aperture_length_m
+
+
+def advance(trajectory: xr.Dataset, *, speed_m_per_s: float, duration_s: float) -> xr.Dataset:
+    """Let the vehicle drive ahead during the scan.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``; its positions are evenly spaced in time.
+    speed_m_per_s
+        Speed of the vehicle, constant and straight ahead, m/s.
+    duration_s
+        Time from the first position to the last, s. At half of it the vehicle is where it is in
+        ``trajectory``: the scene stays fixed to the ground.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory`` with other positions; the same where the speed is 0.
+    """
+    if speed_m_per_s == 0:
+        return trajectory
+    # ASSUME: The vehicle stands still during a frequency sweep and moves from sweep to sweep.
+    # ASSUME: Cart, switches and vehicle keep their speed during the scan, and both antennas take
+    # their echoes at once.
+    time = duration_s * np.linspace(-0.5, 0.5, trajectory.sizes["position"])
+    way = speed_m_per_s * time[None, :, None] * (np.array(AXES) == "y")
+    antennas = {name: trajectory[name].values + way for name in ("transmitter", "receiver")}
+    return variables.dataset("trajectory", antennas, {"channel": trajectory["channel"].values})
+
+
+def imaged_place(
+    x: ArrayLike, y: ArrayLike, *, true_slope: float, told_slope: float
+) -> tuple[Floats, Floats]:
+    """Return where the image shows ground when imaging is told another speed.
+
+    From the position ``(s, k s)`` on an aperture of the slope ``k`` a point has the squared range
+    ``|p|^2 + (1 + k^2) s^2 - 2 s (x + k y)``. It is imaged where distance ``|p'|`` and
+    ``x' + k' y'`` of the slope ``k'`` that imaging is told are the same; what remains,
+    ``(k^2 - k'^2) s^2``, defocuses. Near broadside that is a turn by the error of the yaw angle.
+    The height is not touched: it comes from the difference of the two ranges alone.
+
+    Parameters
+    ----------
+    x, y
+        Ground points relative to the aperture's centre, m, of shapes that broadcast.
+    true_slope, told_slope
+        ``v / u`` of the true speed and of the one that imaging is told (`slope`).
+
+    Returns
+    -------
+    tuple of ndarray
+        x and y in the image, m, on the same side of the aperture; NaN where nothing fits.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    distance = np.hypot(x, y)
+    cosine = (x + true_slope * y) / (np.sqrt(1 + told_slope**2) * distance)
+    from_axis = np.arccos(np.where(np.abs(cosine) <= 1, cosine, np.nan))
+    side = np.where(y >= true_slope * x, 1.0, -1.0)
+    azimuth = np.arctan(told_slope) + side * from_axis
+    return distance * np.cos(azimuth), distance * np.sin(azimuth)
+
+
+def _half_path(antennas: xr.Dataset, point: Floats) -> Floats:
+    legs = [
+        np.linalg.norm(antennas[name].values - point, axis=-1)
+        for name in ("transmitter", "receiver")
+    ]
+    return np.asarray(legs[0] + legs[1]) / 2
+
+
+def peak_place(
+    truth: xr.Dataset, recorded: xr.Dataset, point: Floats, aperture_weights: Floats
+) -> Floats:
+    """Return where the image of a point target on the ground lies, by channel.
+
+    The ground point whose half paths from the recorded positions match those of the target from
+    the true ones best, by least squares over the aperture.
+
+    Parameters
+    ----------
+    truth, recorded
+        Product ``trajectory``: where the antennas were, and where imaging takes them to be.
+    point
+        Position of the target (3,), m.
+    aperture_weights
+        Weights of the positions, of sum 1.
+
+    Returns
+    -------
+    ndarray, shape (channel, 3)
+        Places, m, at the target's height.
+    """
+    from scipy.optimize import leastsq
+
+    weight = np.sqrt(aperture_weights)
+    found = np.tile(point, (truth.sizes["channel"], 1))
+    for channel, path in enumerate(_half_path(truth, point)):
+        ends = [recorded[name].values[channel] for name in ("transmitter", "receiver")]
+
+        def miss(place: Floats, ends: list[Floats] = ends, path: Floats = path) -> Floats:
+            legs = [np.linalg.norm(end - [*place, point[2]], axis=-1) for end in ends]
+            return np.asarray(weight * ((legs[0] + legs[1]) / 2 - path))
+
+        def gradient(place: Floats, ends: list[Floats] = ends) -> Floats:
+            rays = [[*place, point[2]] - end for end in ends]
+            units = [ray / np.linalg.norm(ray, axis=-1)[:, None] for ray in rays]
+            return np.asarray(weight[:, None] * (units[0] + units[1])[:, :2] / 2)
+
+        # MINPACK itself: what wraps it takes several times as long as the few steps. With its full
+        # output it does not warn where a target is imaged nowhere, and ends at the nearest place.
+        found[channel, :2] = leastsq(miss, point[:2], Dfun=gradient, full_output=True)[0]
+    return found
+
+
+def point_gain(
+    truth: xr.Dataset,
+    recorded: xr.Dataset,
+    point: Floats,
+    place: Floats,
+    frequency: Floats,
+    range_weights: Floats,
+    aperture_weights: Floats,
+) -> Floats:
+    """Return how much of a point target's image is found at a place, by channel.
+
+    The exact matched filter of the recorded positions applied to the echo of the true ones:
+    ``|sum_l v_l sum_k w_k exp(4 pi i f_k (rho_recorded - rho_true) / c)|``, 1 at the
+    target's own position without errors.
+
+    Parameters
+    ----------
+    truth, recorded
+        Product ``trajectory``: where the antennas were, and where imaging takes them to be.
+    point
+        Position of the target (3,), m.
+    place
+        Where the image is looked at, by channel (channel, 3), m: `peak_place`, or the target's
+        own position.
+    frequency
+        Evenly spaced frequencies, Hz.
+    range_weights, aperture_weights
+        Weights of frequencies and positions, each of sum 1.
+
+    Returns
+    -------
+    ndarray, shape (channel,)
+        Amplitude relative to perfect focus.
+    """
+    delay = 2 * (_half_path(recorded, place[:, None]) - _half_path(truth, point)) / SPEED_OF_LIGHT
+    # The frequencies are evenly spaced: the sum over them is a polynomial of the step's phase.
+    step = np.exp(2j * np.pi * delay * (frequency[1] - frequency[0]))
+    profile = polynomial.polyval(step, range_weights) * np.exp(2j * np.pi * delay * frequency[0])
+    return np.asarray(np.abs(profile @ aperture_weights))
+
+
+def sufficient_error(errors: Floats, spread: Floats, *, factor: float) -> float:
+    """Return the largest error that lets the heights' spread exceed the error-free one's so far.
+
+    Parameters
+    ----------
+    errors
+        Errors (level,), rising from 0.
+    spread
+        Spread of the heights at each.
+    factor
+        How far the spread may go, in units of that without error.
+
+    Returns
+    -------
+    float
+        Linear between the levels; infinite if the spread stays below at all of them.
+    """
+    limit = factor * spread[0]
+    beyond = np.flatnonzero(spread > limit)
+    if beyond.size == 0:
+        return float("inf")
+    last = int(beyond[0])
+    return float(np.interp(limit, spread[last - 1 : last + 1], errors[last - 1 : last + 1]))

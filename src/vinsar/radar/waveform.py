@@ -1,0 +1,174 @@
+"""The waveform and what follows from it: wavelength, resolution, ambiguity, critical baseline."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.radar import aperture
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+WindowName = Literal["rectangular", "hann", "hamming", "blackman"]
+
+
+def frequencies(
+    start_frequency_hz: float, stop_frequency_hz: float, frequency_count: int
+) -> NDArray[np.floating]:
+    """Return the evenly spaced frequencies of the stepped waveform, both ends included.
+
+    Parameters
+    ----------
+    start_frequency_hz, stop_frequency_hz
+        Lowest and highest frequency, Hz.
+    frequency_count
+        How many, at least 2.
+
+    Returns
+    -------
+    ndarray, shape (frequency,)
+        Frequencies, Hz.
+
+    Raises
+    ------
+    ValueError
+        If the frequencies do not rise or are fewer than 2.
+    """
+    if not 0 < start_frequency_hz < stop_frequency_hz:
+        raise ValueError(
+            f"the start frequency {start_frequency_hz} Hz must be positive and below "
+            f"the stop frequency {stop_frequency_hz} Hz"
+        )
+    if frequency_count < 2:
+        raise ValueError(f"{frequency_count} frequencies make no range profile; take 2 or more")
+    return np.linspace(start_frequency_hz, stop_frequency_hz, frequency_count)
+
+
+def carrier(frequency: ArrayLike) -> float:
+    """Return the carrier: the middle of the band, Hz."""
+    values = np.asarray(frequency, dtype=float)
+    return float(values[0] + values[-1]) / 2
+
+
+def wavelength(frequency_hz: float) -> float:
+    """Return the wavelength in metres."""
+    return SPEED_OF_LIGHT / frequency_hz
+
+
+def range_resolution(bandwidth_hz: float) -> float:
+    """Return the slant-range resolution ``c / 2W`` in metres, with W the bandwidth."""
+    return SPEED_OF_LIGHT / (2 * bandwidth_hz)
+
+
+def unambiguous_range(frequency_step_hz: float) -> float:
+    """Return the range in metres after which a stepped waveform repeats."""
+    return SPEED_OF_LIGHT / (2 * frequency_step_hz)
+
+
+def azimuth_resolution(
+    wavelength_m: float, slant_range_m: ArrayLike, aperture_length_m: float
+) -> NDArray[np.floating]:
+    """Return the resolution across the range direction, ``lambda r / 2L``, at broadside.
+
+    Parameters
+    ----------
+    wavelength_m
+        Wavelength, m.
+    slant_range_m
+        Slant range from the aperture's centre, m.
+    aperture_length_m
+        Length of the aperture, m.
+
+    Returns
+    -------
+    ndarray
+        Resolution, m, in the shape of `slant_range_m`.
+    """
+    return wavelength_m * np.asarray(slant_range_m) / (2 * aperture_length_m)
+
+
+def ground_resolution(
+    aperture_: aperture.Aperture,
+    x: ArrayLike,
+    y: ArrayLike,
+    *,
+    frequency: NDArray[np.floating],
+) -> NDArray[np.floating]:
+    """Return the resolution on the ground plane in x and y.
+
+    In y the path's cell ``c / W`` over the path's derivative by y; in x the wavelength over the
+    derivative by x of the path's change along the aperture. On a rail that is ``lambda r / 2L``
+    over the squared cosine of the squint, by which the aperture shortens and the angle turns; with
+    one end that stands still, twice as much.
+
+    Parameters
+    ----------
+    aperture_
+        The aperture.
+    x, y
+        Points, m, of shapes that broadcast.
+    frequency
+        Frequencies, Hz.
+
+    Returns
+    -------
+    ndarray, shape (2, ...)
+        Resolution in x and y, m.
+    """
+    path, slope = aperture.gradients(aperture_, x, y)
+    cell = 2 * range_resolution(float(frequency[-1] - frequency[0]))
+    return np.abs(np.stack([wavelength(carrier(frequency)) / slope[0], cell / path[1]]))
+
+
+def window(name: WindowName, count: int) -> NDArray[np.floating]:
+    """Return a symmetric weighting, scaled to a sum of 1.
+
+    Parameters
+    ----------
+    name
+        Name of the weighting.
+    count
+        Number of samples.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        Weights.
+    """
+    from scipy.signal import windows
+
+    # One sample more on each side, so that hann and blackman keep their end samples.
+    if name == "rectangular":
+        weights = np.ones(count)
+    elif name == "hamming":
+        weights = windows.hamming(count, sym=True)
+    else:
+        weights = windows.get_window(name, count + 2, fftbins=False)[1:-1]
+    return weights / weights.sum()
+
+
+def window_width(name: WindowName) -> float:
+    """Return a weighting's -3 dB width in units of the resolution ``c / 2W``.
+
+    The root of the transform of the continuous weighting, ``|F(u)|^2 = 1/2``.
+    """
+    from scipy.optimize import brentq
+
+    terms = {
+        "rectangular": (1.0, 0.0, 0.0),
+        "hann": (0.5, 0.5, 0.0),
+        "hamming": (0.54, 0.46, 0.0),
+        "blackman": (0.42, 0.5, 0.08),
+    }[name]
+
+    def excess(u: float) -> float:
+        transform = sum(
+            a / (2 if k else 1) * (np.sinc(u - k) + np.sinc(u + k)) * (1 if k else 0.5)
+            for k, a in enumerate(terms)
+        )
+        return float((transform / terms[0]) ** 2 - 0.5)
+
+    return 2 * float(brentq(excess, 1e-6, 1.5))

@@ -1,0 +1,1 @@
+"""Results on disk: storage, provenance, lineage, crate, reproduction."""

@@ -1,0 +1,1 @@
+"""The true scene and its echo: the one wing that knows the truth."""

@@ -1,0 +1,1 @@
+"""A study: its configuration, its checks, its pipeline, its own data."""

@@ -1,0 +1,477 @@
+"""Files of the user's own, surveyed heights and measured echoes, checked and made products.
+
+docs/own-data.md describes their form. Whatever is wrong with a file is one sentence that names it
+and says what to change.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar.foundations import variables
+from vinsar.foundations.constants import AXES, CHANNELS
+from vinsar.radar import trajectory, waveform
+from vinsar.results import storage
+from vinsar.simulation import scene
+from vinsar.study import config, pipeline, validation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+    Antennas = tuple[Floats, Floats]
+
+_METRES = ("m", "metre", "metres", "meter", "meters")
+_HERTZ = ("Hz", "hertz", "Hertz", "s-1", "1/s")
+_GEOTIFF = (".tif", ".tiff")
+
+# Steps may differ by this share of themselves: a thousandth of a frequency step turns the phase by
+# 6 mrad at the far end of the unambiguous range.
+_UNEVEN = 1e-3
+
+# The rules of the configuration see the antennas above the origin.
+_OFF_ORIGIN_M = 1.0
+
+
+def load(*paths: str | Path) -> config.Study:
+    """Read configuration files as `validation.load` does, with what a measurement adds to them.
+
+    Parameters
+    ----------
+    paths
+        YAML files; the first is usually ``config/paper.yaml``, which has every key.
+
+    Returns
+    -------
+    config.Study
+        The checked configuration.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If anything is wrong with it or with the file that it names.
+    """
+    return check(validation.read(*paths))
+
+
+def check(raw: Mapping[str, Any]) -> config.Study:
+    """Check a configuration; a measurement's file takes the place of the section ``radar``.
+
+    Parameters
+    ----------
+    raw
+        Every key with its value, as read from YAML.
+
+    Returns
+    -------
+    config.Study
+        The checked configuration, whose radar is that of the measurement, if it has one.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If anything is wrong with it or with the measurement's antennas and frequencies.
+    """
+    section = raw.get("measurement")
+    path = section.get("file") if isinstance(section, dict) else None
+    if not isinstance(path, str):
+        return validation.check(raw)
+    with _blaming("measurement.file", path), _netcdf(path) as stored:
+        frequency, antennas = _waveform(stored)
+        near = (raw.get("imaging") or {}).get("y_min_m")
+        if isinstance(near, float):
+            _refuse_misplaced(antennas, near)
+    study = validation.check(validation.merge(raw, {"radar": _radar(frequency, antennas)}))
+    _refuse_ambiguous(frequency, antennas, study.imaging)
+    return study
+
+
+def read(study: config.Study) -> dict[str, xr.Dataset]:
+    """Read the products that a study takes from files (`pipeline.from_files`).
+
+    Parameters
+    ----------
+    study
+        The configuration.
+
+    Returns
+    -------
+    dict of xarray.Dataset
+        Products by name; none for a study that is simulated as a whole.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If anything is wrong with the file; the message names it and says what to change.
+    """
+    if study.measurement.file is not None:
+        return measurement(study.measurement.file)
+    if study.scene.terrain == "file":
+        return {"elevation": elevation(study.scene, antenna_height_m=study.radar.rail_height_m)}
+    return {}
+
+
+def elevation(options: config.Scene, *, antenna_height_m: float) -> xr.Dataset:
+    """Read a file of heights and bring them onto the scene's raster.
+
+    Parameters
+    ----------
+    options
+        The scene.
+    antenna_height_m
+        Height of the lower antenna, m, which the terrain must not reach.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``elevation``.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If anything is wrong with the file, with the file's name and what to change.
+    """
+    path = Path(str(options.file))
+    with _blaming("scene.file", str(path)):
+        geotiff = path.suffix.lower() in _GEOTIFF
+        product = scene.from_heights(
+            _geotiff_heights(path) if geotiff else _netcdf_heights(path),
+            x_min_m=options.x_min_m,
+            x_max_m=options.x_max_m,
+            y_min_m=options.y_min_m,
+            y_max_m=options.y_max_m,
+            spacing_m=options.terrain_spacing_m,
+            reflectivity_offset=options.reflectivity_offset,
+            easting_m=options.origin_easting_m,
+            northing_m=options.origin_northing_m,
+            heading_deg=options.heading_deg,
+            ground_height_m=options.ground_height_m,
+        )
+        top = float(product["height"].max())
+        if top >= antenna_height_m:
+            raise ValueError(
+                f"variable 'height' rises to {top:.2f} m above the ground plane, and the lower "
+                f"antenna stands at {antenna_height_m:.2f} m; set scene.ground_height_m to the "
+                "height of the ground under the vehicle (null takes it from the file), or raise "
+                "radar.rail_height_m"
+            )
+    return product
+
+
+def measurement(path: str) -> dict[str, xr.Dataset]:
+    """Read a file of measured echoes.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    dict of xarray.Dataset
+        Products ``received``, ``trajectory`` and ``recorded_trajectory``, the last two alike.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If anything is wrong with the file, with the file's name and what to change.
+    """
+    with _blaming("measurement.file", path), _netcdf(path) as stored:
+        frequency, (transmitter, receiver) = _waveform(stored)
+        parts = [_samples(_by_name(stored), f"echo_{part}") for part in ("real", "imag")]
+    echo = np.empty(parts[0].shape, np.result_type(*parts, np.complex64))
+    echo.real, echo.imag = parts
+    antennas = variables.dataset("trajectory", {"transmitter": transmitter, "receiver": receiver})
+    return {
+        "received": variables.dataset("received", {"echo": echo}, {"frequency": frequency}),
+        "trajectory": antennas,
+        "recorded_trajectory": antennas,
+    }
+
+
+def export(folder: str | Path, path: str | Path) -> None:
+    """Write a study's simulated echo in the form of a measurement.
+
+    Parameters
+    ----------
+    folder
+        The study's folder.
+    path
+        The file; it appears whole or not at all.
+
+    Raises
+    ------
+    ValueError
+        If the study has not been run.
+    """
+    received = storage.read(Path(folder) / "received.nc", "received")
+    antennas = storage.read(Path(folder) / "recorded_trajectory.nc", "recorded_trajectory")
+    data = variables.dataset(
+        "measurement",
+        {"echo": received["echo"].values}
+        | {name: antennas[name].values for name in ("transmitter", "receiver")},
+        {"frequency": received["frequency"].values},
+    )
+    title = f"echo of the study {received.attrs['vinsar_study']}, simulated"
+    storage.write(data, path, "measurement", {"title": title, "source": received.attrs["source"]})
+
+
+@contextmanager
+def _blaming(key: str, path: str) -> Iterator[None]:
+    """Say of whatever goes wrong which key and which file it comes from."""
+    try:
+        yield
+    except (OSError, RuntimeError, ValueError) as error:
+        sentence = str(error)
+        if not isinstance(error, ValueError):
+            why = sentence.partition("\n")[0]
+            sentence = f"is truncated or of another format ({why}); write or copy it anew"
+        raise validation.ConfigurationError([validation.Fault(key, path, sentence)]) from error
+
+
+@contextmanager
+def _netcdf(path: str | Path) -> Iterator[xr.Dataset]:
+    """Open a netCDF file, whose values are read when they are asked for."""
+    import xarray as xr
+
+    _refuse_missing(path)
+    try:
+        opened = xr.open_dataset(path, engine="netcdf4", decode_times=False)
+    except Exception as error:  # whatever foreign bytes bring about
+        raise OSError(str(error)) from error
+    with opened:
+        yield opened
+
+
+def _refuse_missing(path: str | Path) -> None:
+    if not Path(path).is_file():
+        raise ValueError("there is no such file; paths begin in the repository's folder")
+
+
+def _netcdf_heights(path: Path) -> xr.Dataset:
+    import xarray as xr
+
+    with _netcdf(path) as stored:
+        axes = {name: _even(stored, name, _METRES) for name in ("y", "x")}
+        names = ["height", *(["reflectivity"] if "reflectivity" in stored else [])]
+        data = {
+            name: (("y", "x"), _values(stored, name, ("y", "x"), units))
+            for name, units in zip(names, (_METRES, ()), strict=False)
+        }
+    return xr.Dataset(data, axes).sortby(["y", "x"])
+
+
+def _geotiff_heights(path: Path) -> xr.Dataset:
+    import rasterio
+    import xarray as xr
+
+    _refuse_missing(path)
+    with rasterio.open(path) as tiff:
+        crs, place = tiff.crs, tiff.transform
+        if crs is not None and crs.is_geographic:
+            raise ValueError(
+                "its coordinates are degrees; bring it into a projection in metres, such as UTM "
+                "(gdalwarp -t_srs EPSG:326xx)"
+            )
+        if crs is not None and crs.linear_units.lower() not in _METRES:
+            raise ValueError(f"its coordinates are in {crs.linear_units}; metres are needed")
+        if place.is_identity:
+            raise ValueError("it is not georeferenced; give it a transform (gdal_edit.py -a_ullr)")
+        if not place.is_rectilinear or place.b or place.d:
+            raise ValueError("its raster is rotated; resample it to north up (gdalwarp)")
+        unit = tiff.units[0]
+        if unit and unit not in _METRES:
+            raise ValueError(f"band 1, the height, is in '{unit}'; metres are needed")
+        # Values belong to the middles of the pixels.
+        axes = {
+            "y": place.f + place.e * (np.arange(tiff.height) + 0.5),
+            "x": place.c + place.a * (np.arange(tiff.width) + 0.5),
+        }
+        if min(tiff.shape) < 2:
+            raise ValueError(f"it has {tiff.height} x {tiff.width} pixels; 2 x 2 are needed")
+        bands = {"height": 1}
+        if "reflectivity" in tiff.descriptions:
+            bands["reflectivity"] = tiff.descriptions.index("reflectivity") + 1
+        data = {
+            name: (("y", "x"), tiff.read(band, masked=True).astype(float).filled(np.nan))
+            for name, band in bands.items()
+        }
+    return xr.Dataset(data, axes).sortby(["y", "x"])
+
+
+def _by_name(stored: xr.Dataset) -> xr.Dataset:
+    """Return a file whose labels lie along the dimensions of their names, not of an index."""
+    for name in ("channel", "axis"):
+        index = f"{name}_index"
+        if index in stored.dims and name not in stored.dims:
+            labelled = name in stored.variables
+            stored = (stored.swap_dims if labelled else stored.rename_dims)({index: name})
+    return stored
+
+
+def _waveform(stored: xr.Dataset) -> tuple[Floats, Antennas]:
+    """Return frequencies and antenna positions, checked by themselves."""
+    stored = _by_name(stored)
+    for part in ("real", "imag"):
+        _declared(stored, f"echo_{part}", ("channel", "position", "frequency"), ())
+    for name, labels in (("channel", CHANNELS), ("axis", AXES)):
+        found = [str(label) for label in _labels(stored, name)]
+        if stored.sizes[name] != len(labels) or (found and found != list(labels)):
+            shown = ", ".join(found) or f"{stored.sizes[name]} entries"
+            raise ValueError(
+                f"dimension '{name}' has {shown}; it must have {', '.join(labels)}, in this order"
+            )
+    if stored.sizes["position"] < 2:
+        raise ValueError("dimension 'position' has 1 entry; an aperture needs two or more")
+    frequency = _even(stored, "frequency", _HERTZ)
+    if frequency[0] > frequency[-1]:
+        raise ValueError("variable 'frequency' falls; sort it and the echo by rising frequency")
+    if frequency[0] <= 0:
+        raise ValueError(f"variable 'frequency' begins at {frequency[0]:g} Hz; it must be positive")
+    antennas = tuple(
+        _values(stored, name, ("channel", "position", "axis"), _METRES)
+        for name in ("transmitter", "receiver")
+    )
+    for name, places in zip(("transmitter", "receiver"), antennas, strict=True):
+        _refuse_unknown(name, places)
+        if places[..., 2].min() <= 0:
+            raise ValueError(
+                f"variable '{name}' has an antenna at z = {places[..., 2].min():g} m, below the "
+                "ground plane z = 0; give heights above ground, z up"
+            )
+    transmitter, receiver = antennas
+    middle = (transmitter + receiver).mean(axis=1) / 2
+    if np.hypot(*middle[0, :2]) > _OFF_ORIGIN_M:
+        raise ValueError(
+            f"the lower channel's antennas are centred on x = {middle[0, 0]:.3f} m, "
+            f"y = {middle[0, 1]:.3f} m; shift the coordinates so that the origin lies below their "
+            "centre, with x along the aperture and y ahead"
+        )
+    if np.ptp(transmitter[..., 0] + receiver[..., 0]) == 0:
+        raise ValueError("the antennas do not move along x, so there is no aperture to focus")
+    if np.hypot(*(middle[1] - middle[0])[1:]) == 0:
+        raise ValueError("both channels stand at the same place; without a baseline no height")
+    if middle[1, 2] < middle[0, 2]:
+        raise ValueError("channel 'lower' is above channel 'upper'; exchange them, echoes as well")
+    return frequency, (transmitter, receiver)
+
+
+def _radar(frequency: Floats, antennas: Antennas) -> dict[str, Any]:
+    """Return the section ``radar`` that describes a measurement."""
+    center = (antennas[0] + antennas[1]) / 2
+    middle = center.mean(axis=1)
+    across, up = (middle[1] - middle[0])[1:]
+    # To the nanometre: the mean of many equal heights is not to the last bit that height.
+    aperture = round(float(np.ptp(center[0, :, 0])), 9)
+    return {
+        "start_frequency_hz": float(frequency[0]),
+        "stop_frequency_hz": float(frequency[-1]),
+        "frequency_count": frequency.size,
+        "aperture_length_m": aperture,
+        "position_spacing_m": aperture / (center.shape[1] - 1),
+        "rail_height_m": round(float(middle[0, 2]), 9),
+        "baseline_m": round(float(np.hypot(across, up)), 9),
+        "baseline_angle_deg": round(float(np.rad2deg(np.arctan2(up, across))), 9),
+    }
+
+
+def _refuse_misplaced(antennas: Antennas, near_edge_m: float) -> None:
+    for name, places in zip(("transmitter", "receiver"), antennas, strict=True):
+        foremost = places[..., 1].max()
+        if foremost >= near_edge_m:
+            raise ValueError(
+                f"variable '{name}' has an antenna at y = {foremost:g} m, not before the image, "
+                f"which begins at imaging.y_min_m = {near_edge_m:g} m; y points ahead"
+            )
+
+
+def _refuse_ambiguous(frequency: Floats, antennas: Antennas, imaging: config.Imaging) -> None:
+    trajectory_ = variables.dataset(
+        "trajectory", dict(zip(("transmitter", "receiver"), antennas, strict=True))
+    )
+    _, far = trajectory.range_extent(trajectory_, *pipeline.image_axes(imaging))
+    step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
+    unambiguous = waveform.unambiguous_range(step)
+    if far > unambiguous:
+        fault = validation.Fault(
+            "imaging.y_max_m",
+            imaging.y_max_m,
+            f"its farthest slant range of {far:.2f} m must be within the unambiguous range of the "
+            f"measurement, {unambiguous:.2f} m",
+        )
+        raise validation.ConfigurationError([fault])
+
+
+def _declared(
+    stored: xr.Dataset, name: str, dims: tuple[str, ...], units: tuple[str, ...]
+) -> xr.DataArray:
+    """Return a variable that has these dimensions, in whatever order, and one of these units."""
+    if name not in stored.variables:
+        has = ", ".join(sorted(map(str, stored.variables))) or "none"
+        raise ValueError(f"it lacks the variable '{name}' of dimensions {dims}; it has {has}")
+    array = stored[name]
+    if set(array.dims) != set(dims):
+        raise ValueError(f"variable '{name}' has the dimensions {array.dims}; {dims} are needed")
+    if array.dtype.kind not in "fiu":
+        raise ValueError(
+            f"variable '{name}' is {array.dtype}; real numbers are needed (complex samples as two "
+            "variables, echo_real and echo_imag)"
+        )
+    found = array.attrs.get("units")
+    if units and found not in units:
+        given = "no units" if found is None else f"the units '{found}'"
+        raise ValueError(f"variable '{name}' has {given}; convert it and write units '{units[0]}'")
+    return array.transpose(*dims)
+
+
+def _values(stored: xr.Dataset, name: str, dims: tuple[str, ...], units: tuple[str, ...]) -> Floats:
+    return np.ascontiguousarray(_declared(stored, name, dims, units).values, dtype=float)
+
+
+def _samples(stored: xr.Dataset, name: str) -> Floats:
+    dims = ("channel", "position", "frequency")
+    values = np.asarray(_declared(stored, name, dims, ()).values)
+    _refuse_unknown(name, values)
+    return values
+
+
+def _refuse_unknown(name: str, values: Floats) -> None:
+    unknown = ~np.isfinite(values)
+    if unknown.any():
+        place = tuple(int(index) for index in np.argwhere(unknown)[0])
+        raise ValueError(
+            f"variable '{name}' has {unknown.sum()} values that are missing or not finite, the "
+            f"first at {place}; fill them or leave their positions out"
+        )
+
+
+def _even(stored: xr.Dataset, name: str, units: tuple[str, ...]) -> Floats:
+    """Return an axis that rises or falls in even steps."""
+    values = _values(stored, name, (name,), units)
+    if values.size < 2:
+        raise ValueError(f"variable '{name}' has {values.size} value; two or more are needed")
+    _refuse_unknown(name, values)
+    steps = np.diff(values)
+    if not (np.all(steps > 0) or np.all(steps < 0)):
+        raise ValueError(f"variable '{name}' is not sorted; sort it, and the data along it")
+    step = (values[-1] - values[0]) / steps.size
+    off = float(np.abs(steps / step - 1).max())
+    if off > _UNEVEN:
+        raise ValueError(
+            f"variable '{name}' is uneven: its steps differ by up to {100 * off:.3g} % from "
+            f"{abs(step):g}; resample to even steps (and store it in double precision)"
+        )
+    return values
+
+
+def _labels(stored: xr.Dataset, name: str) -> list[Any]:
+    if name not in stored.variables:
+        return []
+    return [value.decode() if isinstance(value, bytes) else value for value in stored[name].values]

@@ -1,0 +1,1 @@
+"""Sweeps and variants of a study, on a workstation or a cluster."""

@@ -1,0 +1,560 @@
+"""Sweeps: every combination of keys of the configuration, each repeated, on Dask.
+
+A case is a study. What its stages have in common with another case is computed once: a stage's
+product is kept under its name, the keys of the configuration that it declares, and its inputs, by
+channel where the stage works by channel. Nothing here knows what is swept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import threading
+from collections import Counter, OrderedDict
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from vinsar.evaluation import detection_accuracy
+from vinsar.foundations import blocks, variables
+from vinsar.foundations.constants import CHANNELS
+from vinsar.study import config, pipeline, validation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    Row = dict[str, Any]
+    Results = tuple[dict[str, Row], dict[str, str]]
+    # Products by name, each with what tells it from others.
+    Given = Mapping[str, tuple[xr.Dataset, str]]
+    Compute = Callable[
+        [
+            Callable[[list["Case"]], Results],
+            list[list["Case"]],
+            Callable[[Results], None],
+            Callable[[list["Case"], str], None],
+        ],
+        None,
+    ]
+
+logger = logging.getLogger(__name__)
+
+CASES_PER_BLOCK = 15
+"""Cases that a worker takes at a time, and at most loses when it dies."""
+
+# Fewer cases a block where there are few, so that every worker has work to the end.
+_LEAST_BLOCKS = 64
+
+# Products up to this size are told apart by their numbers, which costs 0.1 ms at most: what comes
+# out alike for other keys (positions without errors, one channel's antennas) is then known to be.
+# Larger ones, images above all, are told apart by what they were made from.
+_SMALL_BYTES = 1 << 16
+
+_RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
+_OF_OBJECTS = "detection_accuracy"
+_STATISTICS = tuple(name for name, own in variables.SWEEP.items() if own.dims == ("region",))
+# Units by the ends of keys; UDUNITS knows the decibel by this name alone.
+UNITS = {
+    "m_per_s": "m s-1", "m": "m", "s": "s", "hz": "Hz", "db": "0.1 lg(re 1)", "deg": "degree",
+}  # fmt: skip
+
+
+class SweepError(RuntimeError):
+    """Cases that raised; those that finished are kept."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One study of a sweep.
+
+    Attributes
+    ----------
+    index
+        Place along each swept key, and the realization last.
+    changes
+        Swept key and its value.
+    study
+        The study.
+    key
+        Digest of all that the case depends on in the configuration.
+    """
+
+    index: tuple[int, ...]
+    changes: dict[str, Any]
+    study: config.Study
+    key: str
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{key} = {value}" for key, value in self.changes.items())
+        return f"{values}, realization {self.study.realization}"
+
+
+def _digest(*parts: str | bytes) -> str:
+    digest = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        digest.update(part.encode() if isinstance(part, str) else part)
+        digest.update(b"\0")
+    return digest.hexdigest()
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, default=str)
+
+
+def _results(scene: config.Scene) -> tuple[str, ...]:
+    """Return the products that a case is judged by: how well objects are found, if it has any."""
+    return (*_RESULTS, _OF_OBJECTS) if scene.objects else _RESULTS
+
+
+def _stages(study: config.Study, name: str) -> dict[str, pipeline.Stage]:
+    return pipeline.needed(_results(config.swept_section(study, name, "scene")))
+
+
+def declared(study: config.Study, name: str) -> list[str]:
+    """Return every key of the configuration that the stages of a sweep's cases declare.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+
+    Returns
+    -------
+    list of str
+        Sections and single keys.
+    """
+    stages = _stages(study, name).values()
+    return list(dict.fromkeys(key for stage in stages for key in stage.sections))
+
+
+def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config.Study]]:
+    """Return a sweep's studies, all checked, each with its swept keys and their values.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+
+    Returns
+    -------
+    list of tuple
+        The product of the swept values, the last key fastest.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If a swept key changes nothing, or one of them is not a valid study.
+    """
+    _refuse_idle(study, name)
+    return [
+        (changes, _share(case, study)) for changes, case in validation.sweep_studies(study, name)
+    ]
+
+
+def cases(study: config.Study, name: str, *given: str) -> list[Case]:
+    """Return a sweep's cases, those that share their first stages next to each other.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+    *given
+        What tells the products from files from others.
+
+    Returns
+    -------
+    list of Case
+        The product of the swept values and the realizations.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If a swept key changes nothing, or any case is not a valid study; nothing has run then.
+    """
+    sweep = study.sweeps[name]
+    names = declared(study, name)
+    shape = [len(values) for values in sweep.over.values()]
+    sections = [stage.sections for stage in _stages(study, name).values()]
+    # What the first stages read changes slowest, so that few of their products are kept at a time.
+    seen: list[dict[str, int]] = [{} for _ in sections]
+    found = []
+    for index, (changes, case) in zip(np.ndindex(*shape), studies(study, name), strict=True):
+        values = case.values(names)
+        for realization in range(sweep.realizations):
+            values["realization"] = realization
+            texts = (_text({key: values[key] for key in part}) for part in sections)
+            rank = [
+                known.setdefault(text, len(known)) for known, text in zip(seen, texts, strict=True)
+            ]
+            one = case.model_copy(update={"realization": realization})
+            key = _digest(_text(values), *given)
+            found.append((rank, Case((*index, realization), changes, one, key)))
+    found.sort(key=lambda item: item[0])
+    return [case for _, case in found]
+
+
+def _refuse_idle(study: config.Study, name: str) -> None:
+    """Refuse swept keys that no stage of a case reads, and values that stand there twice."""
+    faults = []
+    read = [f"{key}." for key in declared(study, name)]
+    for key, values in study.sweeps[name].over.items():
+        where = f"sweeps.{name}.over.{key}"
+        if key == "realization":
+            advice = f"is counted by sweeps.{name}.realizations; take it out of `over`"
+            faults.append(validation.Fault(where, None, advice))
+        elif key == "scene.objects":
+            advice = (
+                "must be the same in all cases; put them into scene.objects or the sweep's base"
+            )
+            faults.append(validation.Fault(where, None, advice))
+        # A key that is not there at all is for the check of the cases, which says what was meant.
+        elif key in validation.every_key() and not any(
+            f"{key}.".startswith(part) or part.startswith(f"{key}.") for part in read
+        ):
+            advice = "no stage of a case reads it, so all its values would give the same result"
+            faults.append(validation.Fault(where, None, advice))
+        count = Counter(_text(float(v) if _is_number(v) else v) for v in values)
+        twice = [text for text, times in count.items() if times > 1]
+        if twice:
+            faults.append(validation.Fault(where, ", ".join(twice), "stands there more than once"))
+    if faults:
+        raise validation.ConfigurationError(faults)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _share(case: config.Study, study: config.Study) -> config.Study:
+    """Return a case that holds the study's own sections where they are equal: less memory."""
+    same = {name: getattr(study, name) for name in type(study).model_fields}
+    return case.model_copy(
+        update={name: part for name, part in same.items() if getattr(case, name) == part}
+    )
+
+
+class _Product:
+    """A stage's product with what tells it from others, whole and by channel."""
+
+    def __init__(self, parts: list[tuple[xr.Dataset, str]]) -> None:
+        self.parts = parts
+        self._whole: tuple[xr.Dataset, str] | None = None
+        self._channels: list[tuple[xr.Dataset, str]] | None = None
+
+    def whole(self) -> tuple[xr.Dataset, str]:
+        if self._whole is None:
+            whole = self.parts[0]
+            if len(self.parts) > 1:
+                joined = pipeline.join_channels([part for part, _ in self.parts])
+                whole = joined, _digest(*(name for _, name in self.parts))
+            self._whole = whole
+        return self._whole
+
+    def channel(self, index: int) -> tuple[xr.Dataset, str]:
+        if len(self.parts) > 1:
+            return self.parts[index]
+        data, name = self.parts[0]
+        if "channel" not in data.dims:
+            return self.parts[0]
+        if self._channels is None:
+            split = [pipeline.split_channel({"": data}, label)[""] for label in CHANNELS]
+            self._channels = [
+                (part, _identity(part, _digest(name, label)))
+                for part, label in zip(split, CHANNELS, strict=True)
+            ]
+        return self._channels[index]
+
+
+class Memo:
+    """Products of stages, the latest of each stage, shared by the threads of a process.
+
+    Parameters
+    ----------
+    capacity
+        How many products of a stage (and channel) are kept, at least; as many threads as ever work
+        at once have two each.
+
+    Attributes
+    ----------
+    computed
+        How often each stage (and channel) has been computed.
+    """
+
+    def __init__(self, capacity: int = 4) -> None:
+        self._capacity = capacity
+        self._active = 0
+        self._lock = threading.Lock()
+        self._kept: dict[str, OrderedDict[str, Future[_Product]]] = {}
+        self.computed: dict[str, int] = {}
+
+    def kept(self) -> dict[str, int]:
+        """Return how many products of each stage (and channel) are kept."""
+        with self._lock:
+            return {name: len(products) for name, products in self._kept.items()}
+
+    def products(
+        self, names: Iterable[str], study: config.Study, given: Given | None = None
+    ) -> pipeline.Products:
+        """Return products for a study, computing only what is neither given nor kept."""
+        with self._lock:
+            self._active += 1
+            self._capacity = max(self._capacity, 2 * self._active)
+        try:
+            return self._products(tuple(names), study, given or {})
+        finally:
+            with self._lock:
+                self._active -= 1
+
+    def _products(
+        self, wanted: tuple[str, ...], study: config.Study, given: Given
+    ) -> pipeline.Products:
+        made = {name: _Product([product]) for name, product in given.items()}
+        stages = pipeline.needed(wanted)
+        values = study.values({name for stage in stages.values() for name in stage.sections})
+        for name, stage in stages.items():
+            setting = {key: values[key] for key in stage.sections}
+            text = _text(setting)
+            compute = partial(_compute, stage, setting)
+            inputs = {key: made[key] for key in stage.inputs}
+            inputs |= {key: made[key] for key in stage.optional if key in made}
+            if stage.by_channel:
+                made[name] = _Product(
+                    [
+                        self._get(
+                            f"{name}/{label}",
+                            text,
+                            {key: product.channel(index) for key, product in inputs.items()},
+                            compute,
+                        ).parts[0]
+                        for index, label in enumerate(CHANNELS)
+                    ]
+                )
+            else:
+                whole = {key: product.whole() for key, product in inputs.items()}
+                made[name] = self._get(name, text, whole, compute)
+        return {name: made[name].whole()[0] for name in wanted}
+
+    def _get(
+        self,
+        name: str,
+        setting: str,
+        inputs: Mapping[str, tuple[xr.Dataset, str]],
+        compute: Callable[[pipeline.Products], xr.Dataset],
+    ) -> _Product:
+        key = _digest(name, setting, *(origin for _, origin in inputs.values()))
+        with self._lock:
+            kept = self._kept.setdefault(name, OrderedDict())
+            future = kept.get(key)
+            mine = future is None
+            if future is None:
+                future = kept[key] = Future()
+                self.computed[name] = self.computed.get(name, 0) + 1
+                while len(kept) > self._capacity:
+                    kept.popitem(last=False)
+            else:
+                kept.move_to_end(key)
+        if mine:
+            try:
+                product = compute({label: data for label, (data, _) in inputs.items()})
+                future.set_result(_Product([(product, _identity(product, key))]))
+            except BaseException as error:
+                with self._lock:
+                    kept.pop(key, None)
+                future.set_exception(error)
+        return future.result()
+
+
+def _compute(
+    stage: pipeline.Stage, setting: dict[str, Any], products: pipeline.Products
+) -> xr.Dataset:
+    return stage.compute(products, config.Study.part(setting))
+
+
+def _identity(product: xr.Dataset, origin: str) -> str:
+    """Return what tells a product from others: its numbers if they are few, else its origin."""
+    return origin if product.nbytes > _SMALL_BYTES else _fingerprint(product)
+
+
+def _fingerprint(product: xr.Dataset) -> str:
+    """Return a digest of a product's numbers and labels."""
+    parts: list[str | bytes] = []
+    for name, variable in sorted(product.variables.items(), key=lambda item: str(item[0])):
+        values = variable.values
+        labels = values.dtype.kind in "UO"
+        parts += [
+            str(name),
+            f"{variable.dims} {values.dtype} {values.shape} {variable.attrs}",
+            _text(values.tolist()) if labels else values.tobytes(),
+        ]
+    return _digest(*parts)
+
+
+# One a process: threads share it, and so do a worker's tasks.
+_MEMO = Memo()
+
+
+def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -> Row:
+    """Compute one case.
+
+    Parameters
+    ----------
+    case
+        The case.
+    memo
+        Where products are kept; by default, those of this process.
+    given
+        Products from files, each with what tells it from others.
+
+    Returns
+    -------
+    dict
+        The statistics by region, the median coherence on visible ground, the residues, and the
+        focus by channel; if the scene has objects, how well they are found; in plain numbers.
+    """
+    memo = memo or _MEMO
+    with blocks.serially():
+        products = memo.products(_results(case.study.scene), case.study, given)
+    accuracy, interferogram, unwrapped, focus, truth = (products[name] for name in _RESULTS)
+    row: Row = {name: accuracy[name].values.tolist() for name in _STATISTICS}
+    visible = ~truth["shadow"].values
+    row["coherence"] = float(np.median(interferogram["coherence"].values[visible]))
+    row["residues"] = int(np.abs(unwrapped["residue"].values).sum())
+    row |= {str(name): values.values.tolist() for name, values in focus.data_vars.items()}
+    if _OF_OBJECTS in products:
+        found = products[_OF_OBJECTS].data_vars
+        row |= {str(name): values.values.tolist() for name, values in found.items()}
+    return row
+
+
+def _run_block(given: Given, block: list[Case]) -> Results:
+    rows, errors = {}, {}
+    for case in block:
+        try:
+            rows[case.key] = run_case(case, given=given)
+        except Exception as error:  # whatever a case raises must not cost the others
+            errors[case.key] = f"{type(error).__name__}: {error}"
+    return rows, errors
+
+
+def run(
+    study: config.Study,
+    name: str,
+    *,
+    finished: Mapping[str, Row],
+    keep: Callable[[dict[str, Row]], None],
+    progress: Callable[[int, int], None],
+    compute: Compute,
+    given: Mapping[str, xr.Dataset] | None = None,
+) -> xr.Dataset:
+    """Run a sweep.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+    finished
+        Rows of an earlier run, by the cases' keys; they are not computed again.
+    keep
+        Called with each block's rows as it finishes, in whatever order.
+    progress
+        Called with the number of finished cases and of all.
+    compute
+        ``compute(function, blocks, receive, lost)`` runs the function on each block of cases, in
+        parallel, and calls, in this thread and in any order, ``receive`` with what it returns, or
+        ``lost`` with a block that could not be run and a sentence that says why
+        (`cluster.workers`).
+    given
+        Products from files of the user's own, which all cases share.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``sweep``: each swept key is a dimension, then ``realization``.
+
+    Raises
+    ------
+    SweepError
+        If cases raised, naming them; the others are finished and kept.
+    validation.ConfigurationError
+        If a case is not valid; nothing has run then.
+    """
+    known = {label: (data, _fingerprint(data)) for label, data in (given or {}).items()}
+    everything = cases(study, name, *(print_ for _, print_ in known.values()))
+    rows = {case.key: finished[case.key] for case in everything if case.key in finished}
+    waiting = [case for case in everything if case.key not in rows]
+    logger.info("%d of %d cases are finished", len(rows), len(everything))
+    progress(len(rows), len(everything))
+    errors: dict[str, str] = {}
+
+    def receive(block: Results) -> None:
+        done, failed = block
+        keep(done)
+        rows.update(done)
+        errors.update(failed)
+        progress(len(rows) + len(errors), len(everything))
+
+    def lost(block: list[Case], reason: str) -> None:
+        receive(({}, {case.key: reason for case in block}))
+
+    if waiting:
+        compute(partial(_run_block, known), _blocks(waiting), receive, lost)
+    if errors:
+        listed = [f"{case}: {errors[case.key]}" for case in everything if case.key in errors]
+        shown = "".join(f"\n  {line}" for line in listed[:10])
+        more = f"\n  and {len(listed) - 10} more" if len(listed) > 10 else ""
+        raise SweepError(
+            f"{len(listed)} of {len(everything)} cases of the sweep '{name}' failed; the others "
+            f"are kept, and the next run goes on from them:{shown}{more}"
+        )
+    return _assemble(study.sweeps[name], everything, rows)
+
+
+def _blocks(waiting: list[Case]) -> list[list[Case]]:
+    size = min(CASES_PER_BLOCK, max(1, len(waiting) // _LEAST_BLOCKS))
+    return [waiting[begin : begin + size] for begin in range(0, len(waiting), size)]
+
+
+def dimension(key: str) -> str:
+    """Return the dimension that a swept key becomes."""
+    return key.replace(".", "_")
+
+
+def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Row]) -> xr.Dataset:
+    shape = [*(len(values) for values in sweep.over.values()), sweep.realizations]
+    names = list(rows[everything[0].key])
+    data: dict[str, Any] = {}
+    for name in names:
+        trailing = np.shape(rows[everything[0].key][name])
+        values = np.empty((*shape, *trailing))
+        for case in everything:
+            values[case.index] = rows[case.key][name]
+        data[name] = values.astype(int) if name == "residues" else values
+    swept = {}
+    for key, listed in sweep.over.items():
+        unit = next((unit for end, unit in UNITS.items() if key.endswith(f"_{end}")), "1")
+        numeric = all(_is_number(value) for value in listed)
+        attrs = {"long_name": key} | ({"units": unit} if numeric else {})
+        texts = [value if isinstance(value, str) else _text(value) for value in listed]
+        labels = np.asarray(listed if numeric else texts)
+        swept[dimension(key)] = (labels, attrs)
+    coords = {}
+    if "height_found" in data:
+        coords = {
+            "height_threshold": detection_accuracy.HEIGHT_THRESHOLDS,
+            "amplitude_threshold": detection_accuracy.AMPLITUDE_THRESHOLDS,
+            "object": np.arange(data["object_height"].shape[-1]),
+        }
+    return variables.sweep_dataset(data, swept, coords)

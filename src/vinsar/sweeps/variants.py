@@ -1,0 +1,75 @@
+"""A study beside variants of itself: what other seeds, heights and choices do to the accuracy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from vinsar.study import pipeline, validation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
+
+    from vinsar.study import config
+
+
+def evaluate(
+    study: config.Study, given: Mapping[str, xr.Dataset] | None = None
+) -> dict[str, xr.Dataset]:
+    """Run a study and its variants.
+
+    Parameters
+    ----------
+    study
+        The configuration, with its `variants`.
+    given
+        Products from files of the user's own, the same for all.
+
+    Returns
+    -------
+    dict of xarray.Dataset
+        Product ``accuracy`` of the study itself, named ``as configured``, and of each variant.
+
+    Raises
+    ------
+    validation.ConfigurationError
+        If anything is wrong with a variant; then none is run.
+    """
+    cases = {"as configured": study} | validation.variants(study)
+    return {name: pipeline.run(case, "accuracy", given)["accuracy"] for name, case in cases.items()}
+
+
+def as_markdown(results: dict[str, xr.Dataset]) -> str:
+    """Return the accuracies as a Markdown table.
+
+    Parameters
+    ----------
+    results
+        Product ``accuracy`` by name.
+
+    Returns
+    -------
+    str
+        A row a variant: whole scene and visible ground.
+    """
+    tolerance = 100 * float(next(iter(results.values()))["tolerance"])
+    lines = [
+        f"| variant | within {tolerance:g} cm | std | worst | visible: within {tolerance:g} cm | "
+        "visible: std | in shadow |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name, accuracy in results.items():
+        scene, seen, shadow = (
+            accuracy.sel(region=region) for region in ("whole_scene", "visible_ground", "shadow")
+        )
+        lines.append(
+            f"| {name} "
+            f"| {100 * float(scene['fraction_within_tolerance']):.1f} % "
+            f"| {100 * float(scene['std']):.2f} cm "
+            f"| {float(scene['maximum_absolute']):.2f} m "
+            f"| {100 * float(seen['fraction_within_tolerance']):.1f} % "
+            f"| {100 * float(seen['std']):.2f} cm "
+            f"| {100 * float(shadow['cell_count']) / float(scene['cell_count']):.1f} % |"
+        )
+    return "\n".join(lines) + "\n"
