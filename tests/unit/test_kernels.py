@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import dask
+import numba
 import numpy as np
 import pytest
 
@@ -354,6 +355,93 @@ def test_compiled_kernels_are_kept_wherever_something_can_be_written(tmp_path, w
         environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
     hits = [int(python(HITS, **environment)) for _ in range(2)]
     assert hits == [0, 0 if writable == "nothing" else 1]
+
+
+PROBE = """
+import numpy as np
+from vinsar.kernels.compiling import kernel
+from vinsar.kernels.functions import spline
+
+@kernel
+def weights(out):
+    out[0], out[1], out[2], out[3] = spline(np.float32(0.2))
+"""
+WEIGHTS = """
+import numpy as np, probe
+out = np.empty(4, np.float32)
+probe.weights(out)
+print(probe.weights.stats.cache_path)
+print(*out)
+"""
+
+EDITS = """
+import importlib
+from pathlib import Path
+from vinsar.kernels import columns, compiling
+for source in Path(columns.__file__).parent.glob("*.py"):
+    source.write_bytes(source.read_bytes() + b"# edited")
+    importlib.reload(compiling)
+    print(compiling.kernel(columns.resample.py_func).stats.cache_path)
+"""
+
+
+def test_an_edit_of_any_kernel_source_reaches_all_machine_code(tmp_path):
+    package = tmp_path / "vinsar"
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "probe.py").write_text(PROBE, encoding="utf-8")
+
+    def run(code=WEIGHTS):
+        environment = {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+        return python(code, **environment).splitlines()
+
+    kept, before = run()
+    functions_ = package / "kernels" / "functions.py"
+    source = functions_.read_text(encoding="utf-8")
+    edited = source.replace("return first, second,", "return first, _HALF * second,")
+    functions_.write_text(edited, encoding="utf-8")
+    other, after = run()
+    assert float(after.split()[1]) == pytest.approx(float(before.split()[1]) / 2)
+    assert not Path(kept).exists()
+    assert any(Path(other).iterdir())
+    folders = {kept, other, *run(EDITS)}
+    assert len(folders) == 2 + len(list((package / "kernels").glob("*.py")))
+
+
+def double(values):
+    for i in range(values.size):
+        values[i] *= 2
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("size", [0, 1, 100])
+def test_a_cache_cut_short_is_made_again(tmp_path, monkeypatch, caplog, suffix, size):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    def hits():
+        values = np.ones(3)
+        compiled = kernel(double)
+        compiled(values)
+        assert (values == 2).all()
+        return sum(compiled.stats.cache_hits.values())
+
+    assert hits() == 0
+    (spoilt,) = tmp_path.rglob(f"*.{suffix}")
+    whole = spoilt.read_bytes()
+    spoilt.write_bytes(whole[:size])
+    assert [hits(), hits()] == [0, 1]
+    assert "spoilt" in caplog.text
+    assert [path.stat().st_size for path in tmp_path.rglob(f"*.{suffix}")] == [len(whole)]
+
+
+def test_a_cache_that_cannot_be_written_any_more_does_no_harm(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    compiled = kernel(double)
+    # A file where the folder should be stops even those whom permissions do not.
+    Path(compiled.stats.cache_path).touch()
+    values = np.ones(3)
+    compiled(values)
+    assert (values == 2).all()
+    assert "could not be cached" in caplog.text
 
 
 def test_the_library_starts_without_what_only_kernels_and_figures_need():

@@ -1,8 +1,4 @@
-"""Functions that loops over single-precision numbers evaluate, in a form that vectorises.
-
-Numba compiles these into the kernels that use them and does not see their caches go stale: after an
-edit here, touch those.
-"""
+"""Functions that loops over single-precision numbers evaluate, in a form that vectorises."""
 
 from __future__ import annotations
 

@@ -2,9 +2,6 @@
 
 AVX-512 finds 16 samples among 32 in two registers with one instruction. Without it, or where places
 lie further apart, samples are copied one by one: the same samples, so the same results.
-
-Numba compiles this into the kernels that use it and does not see their caches go stale: after an
-edit here, touch them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""One antenna position's part of the matched filter, for pixels in a row: look up, turn, add.
-
-Numba compiles this into the kernels that use it and does not see their caches go stale: after an
-edit here, touch those.
-"""
+"""One antenna position's part of the matched filter, for pixels in a row: look up, turn, add."""
 
 from __future__ import annotations
 
