@@ -117,38 +117,25 @@ def terrain(
 
 
 def from_heights(
-    heights: xr.Dataset,
+    x: Floats,
+    y: Floats,
+    height: Floats,
+    reflectivity: Floats | None = None,
     *,
-    x_min_m: float,
-    x_max_m: float,
-    y_min_m: float,
-    y_max_m: float,
-    spacing_m: float,
     reflectivity_offset: float,
-    easting_m: float = 0.0,
-    northing_m: float = 0.0,
-    heading_deg: float = 0.0,
-    ground_height_m: float | None = 0.0,
 ) -> xr.Dataset:
-    """Return surveyed heights on a raster of the vehicle's own coordinates.
-
-    They are interpolated bilinearly; where both rasters have a node, its height is kept exactly.
+    """Return surveyed heights as a terrain.
 
     Parameters
     ----------
-    heights
-        ``height`` (y, x), m, and ``reflectivity`` if it is known, on even, rising x (easting) and
-        y (northing).
-    x_min_m, x_max_m, y_min_m, y_max_m, spacing_m
-        Extent and spacing of the raster, m.
+    x, y
+        Axes of the raster, m.
+    height
+        Heights above the ground plane (y, x), m.
+    reflectivity
+        Reflectivity (y, x), if it is known.
     reflectivity_offset
-        Where no reflectivity is known, it is the height in metres plus this, as in `terrain`.
-    easting_m, northing_m
-        Place of the vehicle, m.
-    heading_deg
-        Direction ahead, clockwise from the axis y of the heights.
-    ground_height_m
-        Height that becomes 0; None for that of the place of the vehicle.
+        Otherwise it is the height in metres plus this, as in `terrain`.
 
     Returns
     -------
@@ -158,66 +145,20 @@ def from_heights(
     Raises
     ------
     ValueError
-        If the heights do not cover the raster, lack one there, or leave a negative reflectivity.
+        If a reflectivity would be negative.
     """
-    x = geometry.grid_axis(x_min_m, x_max_m, spacing_m)
-    y = geometry.grid_axis(y_min_m, y_max_m, spacing_m)
-    turn = np.deg2rad(heading_deg)
-    east = easting_m + x * np.cos(turn) + y[:, None] * np.sin(turn)
-    north = northing_m - x * np.sin(turn) + y[:, None] * np.cos(turn)
-    if ground_height_m is None:
-        place = np.array([easting_m]), np.array([northing_m])
-        ground_height_m = float(_surveyed(heights["height"], *place)[0])
-    height = _surveyed(heights["height"], east, north) - ground_height_m
-    if "reflectivity" in heights:
-        reflectivity = _surveyed(heights["reflectivity"], east, north)
-    else:
+    if reflectivity is None:
         reflectivity = height + reflectivity_offset
-    if reflectivity.min() < 0:
-        raise ValueError(
-            f"the reflectivity falls to {reflectivity.min():.3f}; it must not be negative (without "
-            "one of its own the terrain has its height plus scene.reflectivity_offset)"
-        )
+        if reflectivity.min() < 0:
+            raise ValueError(
+                f"its heights fall to {height.min():.3f} m above the ground plane, so that the "
+                f"reflectivity falls to {reflectivity.min():.3f}, being the height plus "
+                f"scene.reflectivity_offset; take an offset of {-height.min():.3f} or more, give "
+                "the file a 'reflectivity' of its own, or mend scene.ground_height_m"
+            )
     return variables.dataset(
         "elevation", {"height": height, "reflectivity": reflectivity}, {"x": x, "y": y}
     )
-
-
-def _surveyed(raster: xr.DataArray, east: Floats, north: Floats) -> Floats:
-    """Return values at places that the raster must cover and know."""
-    # Rounded, so that a place on a node is not a billionth of a cell beside it.
-    places = []
-    for name, wanted in (("y", north), ("x", east)):
-        axis = raster[name].values
-        index = (wanted - axis[0]) / (axis[-1] - axis[0]) * (axis.size - 1)
-        places.append(np.round(index, 6))
-        if places[-1].min() < 0 or places[-1].max() > axis.size - 1:
-            raise ValueError(
-                f"its {name} goes from {axis[0]:.12g} to {axis[-1]:.12g} m, but "
-                f"{wanted.min():.12g} to {wanted.max():.12g} m are needed; move or shrink the "
-                "scene, or mend origin and heading"
-            )
-    # Only what is needed: neighbours without a value would count, if with a weight of zero.
-    low = [int(np.floor(place.min())) for place in places]
-    high = [int(np.ceil(place.max())) + 1 for place in places]
-    known = raster.values[low[0] : high[0], low[1] : high[1]]
-    shifted = [place - first for place, first in zip(places, low, strict=True)]
-    found = _bilinear(known, *shifted)
-    unknown = ~np.isfinite(found)
-    if unknown.any():
-        first = np.unravel_index(np.argmax(unknown), found.shape)
-        raise ValueError(
-            f"variable '{raster.name}' has no value at x = {east[first]:.12g} m, "
-            f"y = {north[first]:.12g} m, one of {unknown.sum()} places without; fill the gaps, or "
-            "move or shrink the scene"
-        )
-    return found
-
-
-def _bilinear(values: Floats, row: Floats, column: Floats) -> Floats:
-    from scipy.ndimage import map_coordinates
-
-    return np.asarray(map_coordinates(values, [row, column], order=1, mode="nearest"))
 
 
 def roughness(
@@ -366,10 +307,12 @@ def sample(raster: xr.DataArray, x: ArrayLike, y: ArrayLike) -> Floats:
     ndarray
         Values in the shape of the points.
     """
+    from scipy.ndimage import map_coordinates
+
     columns, rows = raster["x"].values, raster["y"].values
     column = (np.asarray(x) - columns[0]) / (columns[1] - columns[0])
     row = (np.asarray(y) - rows[0]) / (rows[1] - rows[0])
-    return _bilinear(raster.values, row, column)
+    return np.asarray(map_coordinates(raster.values, [row, column], order=1, mode="nearest"))
 
 
 def facets(

@@ -6,6 +6,7 @@ and says what to change.
 
 from __future__ import annotations
 
+import logging
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,8 @@ import numpy as np
 
 from vinsar.foundations import variables
 from vinsar.foundations.constants import AXES, CHANNELS
-from vinsar.radar import trajectory, waveform
+from vinsar.radar import geometry, trajectory, waveform
+from vinsar.readers import elevation as surveyed
 from vinsar.results import storage
 from vinsar.simulation import scene
 from vinsar.study import config, pipeline, validation
@@ -28,9 +30,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.floating]
     Antennas = tuple[Floats, Floats]
 
-_METRES = ("m", "metre", "metres", "meter", "meters")
+logger = logging.getLogger(__name__)
+
 _HERTZ = ("Hz", "hertz", "Hertz", "s-1", "1/s")
-_GEOTIFF = (".tif", ".tiff")
 
 # Steps may differ by this share of themselves: a thousandth of a frequency step turns the phase by
 # 6 mrad at the far end of the unambiguous range.
@@ -140,19 +142,22 @@ def elevation(options: config.Scene, *, antenna_height_m: float) -> xr.Dataset:
     """
     path = Path(str(options.file))
     with _blaming("scene.file", str(path)):
-        geotiff = path.suffix.lower() in _GEOTIFF
-        product = scene.from_heights(
-            _geotiff_heights(path) if geotiff else _netcdf_heights(path),
-            x_min_m=options.x_min_m,
-            x_max_m=options.x_max_m,
-            y_min_m=options.y_min_m,
-            y_max_m=options.y_max_m,
-            spacing_m=options.terrain_spacing_m,
-            reflectivity_offset=options.reflectivity_offset,
-            easting_m=options.origin_easting_m,
-            northing_m=options.origin_northing_m,
+        x = geometry.grid_axis(options.x_min_m, options.x_max_m, options.terrain_spacing_m)
+        y = geometry.grid_axis(options.y_min_m, options.y_max_m, options.terrain_spacing_m)
+        found = surveyed.read(
+            path,
+            x,
+            y,
+            origin_m=(options.origin_easting_m, options.origin_northing_m),
             heading_deg=options.heading_deg,
             ground_height_m=options.ground_height_m,
+        )
+        product = scene.from_heights(
+            x,
+            y,
+            found.height,
+            found.reflectivity,
+            reflectivity_offset=options.reflectivity_offset,
         )
         top = float(product["height"].max())
         if top >= antenna_height_m:
@@ -162,6 +167,10 @@ def elevation(options: config.Scene, *, antenna_height_m: float) -> xr.Dataset:
                 "height of the ground under the vehicle (null takes it from the file), or raise "
                 "radar.rail_height_m"
             )
+    for sentence in found.notes:
+        logger.info("%s: %s", path, sentence)
+    for sentence in found.warnings:
+        logger.warning("%s: %s", path, sentence)
     return product
 
 
@@ -255,57 +264,6 @@ def _refuse_missing(path: str | Path) -> None:
         raise ValueError("there is no such file; paths begin in the repository's folder")
 
 
-def _netcdf_heights(path: Path) -> xr.Dataset:
-    import xarray as xr
-
-    with _netcdf(path) as stored:
-        axes = {name: _even(stored, name, _METRES) for name in ("y", "x")}
-        names = ["height", *(["reflectivity"] if "reflectivity" in stored else [])]
-        data = {
-            name: (("y", "x"), _values(stored, name, ("y", "x"), units))
-            for name, units in zip(names, (_METRES, ()), strict=False)
-        }
-    return xr.Dataset(data, axes).sortby(["y", "x"])
-
-
-def _geotiff_heights(path: Path) -> xr.Dataset:
-    import rasterio
-    import xarray as xr
-
-    _refuse_missing(path)
-    with rasterio.open(path) as tiff:
-        crs, place = tiff.crs, tiff.transform
-        if crs is not None and crs.is_geographic:
-            raise ValueError(
-                "its coordinates are degrees; bring it into a projection in metres, such as UTM "
-                "(gdalwarp -t_srs EPSG:326xx)"
-            )
-        if crs is not None and crs.linear_units.lower() not in _METRES:
-            raise ValueError(f"its coordinates are in {crs.linear_units}; metres are needed")
-        if place.is_identity:
-            raise ValueError("it is not georeferenced; give it a transform (gdal_edit.py -a_ullr)")
-        if not place.is_rectilinear or place.b or place.d:
-            raise ValueError("its raster is rotated; resample it to north up (gdalwarp)")
-        unit = tiff.units[0]
-        if unit and unit not in _METRES:
-            raise ValueError(f"band 1, the height, is in '{unit}'; metres are needed")
-        # Values belong to the middles of the pixels.
-        axes = {
-            "y": place.f + place.e * (np.arange(tiff.height) + 0.5),
-            "x": place.c + place.a * (np.arange(tiff.width) + 0.5),
-        }
-        if min(tiff.shape) < 2:
-            raise ValueError(f"it has {tiff.height} x {tiff.width} pixels; 2 x 2 are needed")
-        bands = {"height": 1}
-        if "reflectivity" in tiff.descriptions:
-            bands["reflectivity"] = tiff.descriptions.index("reflectivity") + 1
-        data = {
-            name: (("y", "x"), tiff.read(band, masked=True).astype(float).filled(np.nan))
-            for name, band in bands.items()
-        }
-    return xr.Dataset(data, axes).sortby(["y", "x"])
-
-
 def _by_name(stored: xr.Dataset) -> xr.Dataset:
     """Return a file whose labels lie along the dimensions of their names, not of an index."""
     for name in ("channel", "axis"):
@@ -336,7 +294,7 @@ def _waveform(stored: xr.Dataset) -> tuple[Floats, Antennas]:
     if frequency[0] <= 0:
         raise ValueError(f"variable 'frequency' begins at {frequency[0]:g} Hz; it must be positive")
     antennas = tuple(
-        _values(stored, name, ("channel", "position", "axis"), _METRES)
+        _values(stored, name, ("channel", "position", "axis"), surveyed.METRES)
         for name in ("transmitter", "receiver")
     )
     for name, places in zip(("transmitter", "receiver"), antennas, strict=True):
