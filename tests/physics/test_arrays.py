@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vinsar.radar import aperture, trajectory, waveform
+from vinsar.radar.instrument import Instrument
 
 FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
 WAVELENGTH = 299_792_458.0 / 14e9
@@ -117,7 +118,7 @@ def test_phase_and_height_of_a_raised_target(focus, scatterers, system, target):
     # otherwise: 2 pi / lambda (L^2 / 24) 2 cm / 64 m^2. Interpolation errs by 1e-4 rad.
     assert abs(error) < 2.6e-3
     place = aperture.locate(lower, upper, x, y, absolute + error, WAVELENGTH)
-    cycle = aperture.height_of_ambiguity(lower, upper, x, y, WAVELENGTH)
+    cycle = Instrument.of(antennas, BAND).height_of_ambiguity(x, y)
     # Its share of a cycle.
     assert place[2] == pytest.approx(target[2], abs=2.6e-3 / (2 * np.pi) * cycle)
     assert np.array(place[:2]) == pytest.approx(target[:2], abs=1e-3)
@@ -127,7 +128,7 @@ def test_phase_and_height_of_a_raised_target(focus, scatterers, system, target):
 def test_height_of_ambiguity_is_what_turns_the_phase_of_a_pixel_by_a_cycle(system):
     lower, upper = trajectory.apertures(SYSTEMS[system])
     pixel = np.array([0.5, 13.0])
-    cycle = float(aperture.height_of_ambiguity(lower, upper, *pixel, WAVELENGTH))
+    cycle = float(Instrument.of(SYSTEMS[system], BAND).height_of_ambiguity(*pixel))
     flat = aperture.flat_earth_phase(lower, upper, *pixel, WAVELENGTH)
     ends = flat + 1e-3 * np.array([-1, 1])
     *_, height = aperture.locate(lower, upper, *pixel, ends, WAVELENGTH)
@@ -140,17 +141,15 @@ def test_a_switched_array_doubles_height_of_ambiguity_and_cell_of_the_rail():
         baseline_angle_deg=90.0,
     )  # fmt: skip
     # Transmitters where the rail has its antennas: the lower channel's ellipse is its circle.
-    pairs = [
-        trajectory.apertures(antennas)
+    systems = [
+        Instrument.of(antennas, BAND)
         for antennas in (rail, array("transmitters", (0.0, 0.0, 2.0)), array("receivers"))
     ]
-    rail_, *arrays = (
-        float(aperture.height_of_ambiguity(*pair, 0.0, 13.0, WAVELENGTH)) for pair in pairs
-    )
+    rail_, *arrays = (float(system.height_of_ambiguity(0.0, 13.0)) for system in systems)
     # lambda r2 / 2B for the vertical baseline.
     assert rail_ == pytest.approx(WAVELENGTH * np.hypot(13, 2.3) / 0.6, rel=1e-9)
     # To the ratio of the antenna heights' part in r2.
     assert arrays == pytest.approx([2 * rail_, 2 * rail_], rel=5e-3)
-    cells = [waveform.ground_resolution(pair[0], 0.0, 13.0, frequency=BAND) for pair in pairs]
+    cells = [system.resolution(0.0, 13.0) for system in systems]
     assert cells[1][0] == pytest.approx(2 * cells[0][0])
     assert cells[1][1] == pytest.approx(cells[0][1])

@@ -10,7 +10,7 @@ from scipy.special import spence
 
 from vinsar.foundations import variables
 from vinsar.processing import filtering, focusing, height, interferogram, unwrapping
-from vinsar.radar import aperture, geometry, trajectory, waveform
+from vinsar.radar import aperture, formulas, geometry, trajectory, waveform
 from vinsar.simulation import echo, scene, visibility
 
 FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
@@ -65,15 +65,15 @@ def theory():
     lower = (0.0, 0.0, 2.0)
     slant = float(geometry.slant_range(lower, 0.0, 10.2))
     look = float(geometry.look_angle(lower, 0.0, 10.2))
-    _, across = geometry.baseline_components(0.3, np.pi / 2, look)
+    _, across = formulas.baseline_components(0.3, np.pi / 2, look)
     # Level ground seen from two angles shifts its spectrum: of the band W = 201 x 10 MHz the
     # share B_perp / B_crit is not common to both images.
     cell = 299_792_458.0 / (2 * 201 * 10e6)
-    coherence = 1 - across / geometry.critical_baseline(slant, WAVELENGTH, look, cell)
+    coherence = 1 - across / formulas.critical_baseline(slant, WAVELENGTH, look, cell)
     # Single-look phase variance of circular Gaussian speckle (Bamler and Hartl 1998, Eq. 48).
     angle = np.arcsin(coherence)
     variance = np.pi**2 / 3 - np.pi * angle + angle**2 - spence(1 - coherence**2) / 2
-    ambiguity = geometry.height_of_ambiguity(slant, WAVELENGTH, 0.3, np.pi / 2, look)
+    ambiguity = formulas.height_of_ambiguity(slant, WAVELENGTH, 0.3, np.pi / 2, look)
     return SimpleNamespace(
         coherence=float(coherence), phase=float(np.sqrt(variance)), ambiguity=float(ambiguity)
     )

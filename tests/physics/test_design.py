@@ -75,7 +75,7 @@ def test_position_errors_leave_the_predicted_coherence():
     motion = {"axis": "y", "channels": "independent", "level_wavelengths": level}
     sheet, products = run(motion=motion)
     y = sheet.places
-    errors = level * sheet.wavelength * sheet.phase_per_position(0.0, y, 1)
+    errors = level * sheet.instrument.wavelength * sheet.phase_per_position(0.0, y, 1)
     predicted = float(np.mean(sheet.coherence(y, errors)))
     measured = float(np.median(products["interferogram"]["coherence"].values))
     # 81 draws make the focused share uncertain by sqrt(2 / 81) of the variance 0.37 of the phase;

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vinsar.processing import detection
-from vinsar.radar import geometry
+from vinsar.radar import formulas, geometry
 from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
@@ -78,7 +78,7 @@ def test_the_counts_say_so(products, study):
     lower = np.array([0.0, 0.0, 2.0])
     look = geometry.look_angle(lower, *AT)
     range_ = geometry.slant_range(lower, *AT)
-    ambiguity = geometry.height_of_ambiguity(
+    ambiguity = formulas.height_of_ambiguity(
         range_, 0.0214, study.radar.baseline_m, np.pi / 2, look
     )
     assert ambiguity / 2 > HEIGHT

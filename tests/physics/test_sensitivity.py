@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vinsar.radar import geometry
+from vinsar.radar import formulas, geometry
 
 WAVELENGTH = 299_792_458.0 / 14e9
 ANGLES = [np.deg2rad(value) for value in (30.0, 60.0, 90.0, 120.0)]
@@ -40,7 +40,7 @@ def slope(function, at, step):
 @given(y=st.floats(5, 1e4), baseline=st.floats(0.05, 1), angle=st.floats(0, np.pi))
 def test_eq_2_errs_by_no_more_than_the_curvature_of_the_wave(y, baseline, angle):
     r1, r2, look = geometry_at(y, baseline, angle)
-    plane = geometry.plane_wave_range_difference(baseline, angle, look)
+    plane = formulas.plane_wave_range_difference(baseline, angle, look)
     # r2 = r1 + B sin + B^2 cos^2 / 2 r1 + ...: the next term of the series is smaller by B / r1.
     curvature = baseline**2 * np.cos(angle - look) ** 2 / (2 * r1)
     series = 2 * baseline**3 / r1**2
@@ -49,13 +49,13 @@ def test_eq_2_errs_by_no_more_than_the_curvature_of_the_wave(y, baseline, angle)
 
 @given(baseline=st.floats(0.01, 2), angle=st.floats(0, np.pi), look=st.floats(0, np.pi))
 def test_eq_4_splits_the_baseline_by_pythagoras(baseline, angle, look):
-    along, across = geometry.baseline_components(baseline, angle, look)
+    along, across = formulas.baseline_components(baseline, angle, look)
     assert np.hypot(along, across) == pytest.approx(baseline)
 
 
 def test_eq_4_along_the_line_of_sight_is_eq_2():
-    along, _ = geometry.baseline_components(0.3, np.pi / 2, 1.4)
-    assert along == geometry.plane_wave_range_difference(0.3, np.pi / 2, 1.4)
+    along, _ = formulas.baseline_components(0.3, np.pi / 2, 1.4)
+    assert along == formulas.plane_wave_range_difference(0.3, np.pi / 2, 1.4)
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -67,18 +67,18 @@ def test_eq_5_is_the_slope_of_height_over_baseline_length_for_a_plane_wave(angle
     # Eq. 5 takes the plane wave of Eq. 2. The exact law of cosines adds sin(theta) /
     # cos(beta - theta), metre for metre: 15 % at H0 = 2 m for the vertical baseline.
     curvature = np.sin(look) / np.cos(angle - look)
-    found = geometry.height_per_baseline_length(r1, 0.3, angle, look)
+    found = formulas.height_per_baseline_length(r1, 0.3, angle, look)
     assert found == pytest.approx(exact - curvature, rel=1e-5)
 
 
 def test_eq_5_vanishes_where_the_baseline_is_across_the_line_of_sight():
-    assert geometry.height_per_baseline_length(13.0, 0.3, 1.42, 1.42) == 0
+    assert formulas.height_per_baseline_length(13.0, 0.3, 1.42, 1.42) == 0
 
 
 def test_ahead_of_a_vehicle_a_vertical_baseline_suffers_least_from_its_length():
     r1, _, look = geometry_at(13.0, 0.3, np.pi / 2)
     vertical, horizontal = (
-        abs(geometry.height_per_baseline_length(r1, 0.3, angle, look)) for angle in (np.pi / 2, 0.0)
+        abs(formulas.height_per_baseline_length(r1, 0.3, angle, look)) for angle in (np.pi / 2, 0.0)
     )
     # tan(beta - theta) is cot(theta) for the one and -tan(theta) for the other.
     assert horizontal / vertical == pytest.approx(np.tan(look) ** 2)
@@ -91,7 +91,7 @@ def test_eq_12_is_the_slope_of_height_over_baseline_attitude(angle, y):
     r1, r2, look = geometry_at(y, 0.3, angle)
     phase = float(geometry.interferometric_phase(r1, r2, WAVELENGTH))
     exact = slope(lambda attitude: inverted(r1, phase, 0.3, attitude), angle, 1e-5)
-    assert geometry.height_per_baseline_angle(r1, look) == pytest.approx(exact, rel=1e-6)
+    assert formulas.height_per_baseline_angle(r1, look) == pytest.approx(exact, rel=1e-6)
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -99,14 +99,14 @@ def test_height_of_ambiguity_turns_the_phase_by_one_cycle(angle):
     r1, r2, look = geometry_at(13.0, 0.3, angle)
     phase = float(geometry.interferometric_phase(r1, r2, WAVELENGTH))
     per_radian = slope(lambda value: inverted(r1, value, 0.3, angle), phase, 1e-3)
-    found = geometry.height_of_ambiguity(r1, WAVELENGTH, 0.3, angle, look)
+    found = formulas.height_of_ambiguity(r1, WAVELENGTH, 0.3, angle, look)
     # The exact slope has r2 where the formula has r1. The phase falls with height.
     assert found == pytest.approx(-2 * np.pi * per_radian * r1 / r2, rel=1e-6)
 
 
 def test_height_of_ambiguity_of_the_paper():
     r1, _, look = geometry_at(13.0, 0.3, np.pi / 2)
-    found = geometry.height_of_ambiguity(r1, WAVELENGTH, 0.3, np.pi / 2, look)
+    found = formulas.height_of_ambiguity(r1, WAVELENGTH, 0.3, np.pi / 2, look)
     assert found == pytest.approx(0.469, abs=1e-3)
 
 
@@ -120,9 +120,9 @@ def test_at_the_critical_baseline_the_phase_turns_once_in_a_resolution_cell(y):
 
     r1, _, look = geometry_at(y, short, np.pi / 2)
     per_cell = slope(phase_at, r1, 1e-2) * cell
-    _, across = geometry.baseline_components(short, np.pi / 2, look)
+    _, across = formulas.baseline_components(short, np.pi / 2, look)
     # Phase is proportional to a short baseline; the next order is B / H0 = 5e-4 of it.
-    found = geometry.critical_baseline(r1, WAVELENGTH, look, cell)
+    found = formulas.critical_baseline(r1, WAVELENGTH, look, cell)
     assert found == pytest.approx(2 * np.pi / abs(per_cell) * across, rel=1e-3)
 
 

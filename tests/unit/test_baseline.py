@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vinsar.foundations import variables
-from vinsar.radar import aperture, baseline, geometry, trajectory
+from vinsar.radar import baseline, formulas, geometry, speckle
 from vinsar.study import validation
 
 BASELINE_M = 0.3
@@ -61,7 +61,7 @@ def test_drawn_attitude_errors_have_the_spread_of_eq_12_at_every_attitude(drawn)
 def test_eq_5_lacks_one_term_of_the_exact_derivative():
     seen = view()
     beta = np.deg2rad(np.array([0.0, 30.0, 60.0, 85.0, 90.0]))
-    eq5 = geometry.height_per_baseline_length(seen.slant_range, BASELINE_M, beta, seen.look)
+    eq5 = formulas.height_per_baseline_length(seen.slant_range, BASELINE_M, beta, seen.look)
     exact = baseline.height_per_length(seen, BASELINE_M, beta)
     np.testing.assert_allclose(exact - eq5, np.sin(seen.look) / np.cos(beta - seen.look))
     # A vertical baseline: Eq. 5 says H / B, the exact geometry one more.
@@ -109,36 +109,7 @@ def test_the_view_is_that_of_the_configuration():
     study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
     seen = baseline.view(study.radar, study.scene)
     assert (seen.x_m, seen.y_m, *seen.lower) == (0.0, 13.0, 0.0, 0.0, 2.0)
-    # The figures of the method: 0.469 m of height for a cycle, at x = 0 and y = 13 m.
-    assert float(seen.height_of_ambiguity(0.3)) == pytest.approx(0.469, abs=5e-4)
-    assert float(seen.height_of_ambiguity(0.3)) == pytest.approx(
-        float(
-            geometry.height_of_ambiguity(
-                seen.slant_range, seen.wavelength_m, 0.3, np.pi / 2, seen.look
-            )
-        )
-    )
     assert seen.critical_baseline == pytest.approx(12.21, abs=0.01)
-
-
-@pytest.mark.parametrize("system", ["transmit_pair", "receive_pair"])
-def test_the_view_of_an_array_has_half_the_phase(system):
-    study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
-    radar = study.radar.model_copy(update={"system": system})
-    rail, array = (baseline.view(part, study.scene) for part in (study.radar, radar))
-    lower, upper = trajectory.apertures(trajectory.planned(radar))
-    exact = aperture.height_of_ambiguity(lower, upper, array.x_m, array.y_m, rail.wavelength_m)
-    # The plane wave has r1 for r2, 0.3 % shorter.
-    assert float(array.height_of_ambiguity(0.3)) == pytest.approx(float(exact), rel=5e-3)
-    assert array.critical_baseline == pytest.approx(2 * rail.critical_baseline, rel=0.06)
-
-
-def test_a_random_phase_spreads_the_height_over_the_height_of_ambiguity():
-    seen = view()
-    rng = np.random.default_rng(0)
-    phase = rng.uniform(-np.pi, np.pi, 200_000)
-    height = phase / (2 * np.pi) * float(seen.height_of_ambiguity(BASELINE_M))
-    assert height.std() == pytest.approx(float(seen.random_phase_std(BASELINE_M)), rel=0.005)
 
 
 @pytest.mark.parametrize(("coherence", "looks"), [(0.98, 16), (0.9, 32), (0.7, 64)])
@@ -148,21 +119,13 @@ def test_the_bound_is_that_of_multilooked_speckle(coherence, looks):
     common = np.sqrt(coherence) * unit[0]
     first, second = (common + np.sqrt(1 - coherence) * part for part in unit[1:])
     phase = np.angle((first * second.conj()).sum(0))
-    assert phase.std() == pytest.approx(float(baseline.phase_std(coherence, looks)), rel=0.06)
+    assert phase.std() == pytest.approx(float(speckle.phase_std(coherence, looks)), rel=0.06)
 
 
-def test_the_bound_in_height_is_the_phase_s_share_of_a_cycle():
-    seen = view()
-    bound = seen.height_std_bound(BASELINE_M, 0.9, 4)
-    share = float(baseline.phase_std(0.9, 4)) / (2 * np.pi)
-    assert float(bound) == pytest.approx(share * float(seen.height_of_ambiguity(BASELINE_M)))
-    assert float(baseline.phase_std(1.0, 1)) == 0
-    assert float(baseline.phase_std(0.0, 1)) == np.inf
+def test_the_bound_is_none_for_full_coherence_and_infinite_without():
+    assert float(speckle.phase_std(1.0, 1)) == 0
+    assert float(speckle.phase_std(0.0, 1)) == np.inf
 
 
-def test_coherence_falls_with_the_baseline_and_with_noise():
-    across = np.array([-3.0, 0.0, 3.0, 6.0, 12.0, 15.0])
-    np.testing.assert_allclose(
-        baseline.geometric_coherence(across, 12.0), [0.75, 1, 0.75, 0.5, 0, 0]
-    )
-    np.testing.assert_allclose(baseline.noise_coherence([0.0, 10.0]), [0.5, 10 / 11])
+def test_coherence_falls_with_noise():
+    np.testing.assert_allclose(speckle.noise_coherence([0.0, 10.0]), [0.5, 10 / 11])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vinsar.prediction import design
-from vinsar.radar import aperture, baseline, geometry, trajectory, waveform
+from vinsar.radar import aperture, baseline, formulas, geometry, trajectory
 from vinsar.study import config, validation
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -41,13 +41,13 @@ def exact_height_error(true, told, x, y):
 @pytest.mark.parametrize("angle", [30.0, 60.0, 90.0, 120.0])
 def test_of_a_rail_the_height_of_ambiguity_is_the_paper_s(angle):
     sheet = sheet_of(radar={"baseline_angle_deg": angle})
-    lower, upper = (part.center for part in sheet.apertures)
+    lower, upper = sheet.instrument.separated
     r1, r2 = (geometry.slant_range(end, 0.0, sheet.places) for end in (lower, upper))
     look = geometry.look_angle(lower, 0.0, sheet.places)
-    formula = geometry.height_of_ambiguity(r1, WAVELENGTH, 0.3, np.deg2rad(angle), look)
+    formula = formulas.height_of_ambiguity(r1, WAVELENGTH, 0.3, np.deg2rad(angle), look)
     # The exact slope has r2 where the formula has r1.
     np.testing.assert_allclose(
-        sheet.height_of_ambiguity(sheet.places), formula * r2 / r1, rtol=1e-9
+        sheet.instrument.height_of_ambiguity(0.0, sheet.places), formula * r2 / r1, rtol=1e-9
     )
 
 
@@ -63,7 +63,7 @@ def test_of_a_rail_length_and_attitude_of_the_baseline_are_eqs_5_and_12_with_the
         )
         expected = baseline.height_per_length(seen, 0.3, np.deg2rad(angle))
         assert length.per_unit[number] / 1e-3 == pytest.approx(float(expected), rel=1e-6)
-        eq12 = geometry.height_per_baseline_angle(seen.slant_range, seen.look)
+        eq12 = formulas.height_per_baseline_angle(seen.slant_range, seen.look)
         assert attitude.per_unit[number] == pytest.approx(np.deg2rad(float(eq12)), rel=1e-6)
 
 
@@ -87,37 +87,20 @@ def test_a_switched_array_has_twice_the_rail_s_height_of_ambiguity_and_cell(syst
     rail, array = sheet_of(), sheet_of(radar={"system": system})
     y = rail.places
     # The ends of an array's paths stand at other heights than the rail's: a few per cent.
+    rail, array = rail.instrument, array.instrument
     np.testing.assert_allclose(
-        array.height_of_ambiguity(y), 2 * rail.height_of_ambiguity(y), rtol=0.06
+        array.height_of_ambiguity(0.0, y), 2 * rail.height_of_ambiguity(0.0, y), rtol=0.06
     )
-    np.testing.assert_allclose(array.resolution(y)[0], 2 * rail.resolution(y)[0], rtol=0.02)
-    assert array.unambiguous_width(13.0) > 1.9 * rail.unambiguous_width(13.0)
+    np.testing.assert_allclose(
+        array.resolution(0.0, y)[0], 2 * rail.resolution(0.0, y)[0], rtol=0.02
+    )
+    assert array.unambiguous_width(0.0, 13.0) > 1.9 * rail.unambiguous_width(0.0, 13.0)
 
 
 def test_an_array_dwells_on_each_sample():
     sheet = sheet_of(radar={"system": "receive_pair", "dwell_s": 1e-6})
     assert sheet.scan_duration == pytest.approx(2 * 81 * 401 * 1e-6)
     assert sheet_of().scan_duration == PAPER.vehicle.scan_duration_s
-
-
-def test_a_short_baseline_has_the_critical_baseline_of_the_paper():
-    sheet = sheet_of(radar={"baseline_m": 1e-3})
-    look, range_ = sheet.look(sheet.places), sheet.slant_range(sheet.places)
-    across = geometry.critical_baseline(range_, WAVELENGTH, look, sheet.range_resolution)
-    # To first order of B / H0 = 5e-4; its part across the line of sight is sin(theta) of it.
-    np.testing.assert_allclose(
-        sheet.critical_baseline(sheet.places) * np.sin(look), across, rtol=1e-3
-    )
-
-
-def test_grating_lobes_bound_the_width():
-    sheet = sheet_of()
-    width, slant = sheet.unambiguous_width(13.0), float(sheet.slant_range(13.0))
-    # 4 d sin(squint) = the shortest wavelength; the aperture's ends change the mean by (L / r)^2.
-    sine = (width / 2) / np.hypot(width / 2, slant)
-    assert sine == pytest.approx(waveform.wavelength(15e9) / (4 * 0.01), rel=2e-3)
-    dense = sheet_of(radar={"position_spacing_m": 0.004})
-    assert dense.unambiguous_width(13.0) == np.inf
 
 
 def test_an_obstacle_hides_what_a_ray_over_its_top_misses():
@@ -142,17 +125,16 @@ def test_noise_grows_with_what_makes_noise():
     assert (sheet_of(interferogram={"coherence_window_px": 15}).height_std(y) < 0.6 * quiet).all()
     assert (sheet_of().height_std(y, 0.5) > 1.2 * quiet).all()
     # A random phase is the worst.
-    most = sheet_of().height_of_ambiguity(y) / np.sqrt(12)
+    most = sheet_of().instrument.height_of_ambiguity(0.0, y) / np.sqrt(12)
     np.testing.assert_allclose(sheet_of().height_std(y, 5.0), most)
 
 
 def test_the_noise_is_the_cramer_rao_bound_of_the_baseline_s_figures():
     sheet = sheet_of(echo={"snr_db": 10.0})
-    seen = baseline.view(sheet.study.radar, sheet.study.scene)
-    coherence = 10 / 11 * (1 - 0.3 * np.sin(seen.look) / seen.critical_baseline)
-    bound = seen.height_std_bound(0.3, coherence, 1.0)
-    # The formulas take the wave for plane: B / 2 H0 = 7.5 % of the decorrelation.
-    assert sheet.height_std(13.0) == pytest.approx(float(bound), rel=0.02)
+    coherence = 10 / 11 * sheet.instrument.geometric_coherence(0.0, 13.0)
+    phase = np.sqrt((1 - coherence**2) / 2) / coherence
+    bound = sheet.instrument.height_of_ambiguity(0.0, 13.0) / (2 * np.pi) * phase
+    assert sheet.height_std(13.0) == pytest.approx(float(bound))
 
 
 def test_spreading_makes_the_far_edge_noisier():

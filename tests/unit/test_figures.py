@@ -38,6 +38,7 @@ from vinsar.figures import (
 from vinsar.foundations import variables
 from vinsar.prediction import systems
 from vinsar.radar import baseline, geometry, motion
+from vinsar.radar.instrument import Instrument
 from vinsar.study import config, pipeline, validation
 
 PAPER = Path(__file__).parents[2] / "config" / "paper.yaml"
@@ -353,8 +354,10 @@ def test_geometry_is_to_scale_with_the_study_s_values(monkeypatch: pytest.Monkey
     assert listed[r"wavelength $\lambda$"] == "21.4 mm"
     assert listed["positions"] == "81"
     assert listed[r"$\Delta r = r_1 - r_2$"] == f"{1000 * (r1 - r2):.1f} mm".replace("-", "−")
-    look = np.arctan2(13.0, 2.0 - 0.3)
-    ambiguity = 0.0214137 * r1 * np.sin(look) / (2 * 0.3 * np.cos(np.pi / 3 - look))
+    # On the ground: lambda r1 sin(theta) / 2 B_perp with the upper range for the lower one.
+    ends = [np.hypot(13.0 - y, z) for y, z in ((0.0, 2.0), (0.15, 2.0 + 0.3 * np.sin(np.pi / 3)))]
+    look = np.arctan2(13.0, 2.0)
+    ambiguity = 0.0214137 * ends[1] * np.sin(look) / (2 * 0.3 * np.cos(np.pi / 3 - look))
     assert listed["height of ambiguity"] == f"{ambiguity:.3f} m"
     assert set(listed.values()) - {""} <= set(texts)
 
@@ -374,9 +377,13 @@ def test_geometry_of_an_array_shows_its_transmitters_and_receivers(
     listed = dict(acquisition.values(study))
     r1 = float(geometry.slant_range(lower, 0.0, 13.0, 0.3))
     assert f"$r_1$ = {r1:.3f} m" in written(figure, monkeypatch)
-    # Twice those of a rail: lambda r1 sin(theta) / B_perp, which is lambda r1 / B, and lambda r1/L.
-    assert listed["height of ambiguity"] == f"{0.0214137 * r1 / 0.3:.3f} m"
-    assert listed["resolution in x"] == f"{100 * 0.0214137 * r1 / 0.8:.1f} cm"
+    # About twice those of a rail: lambda r2 / B and lambda r / L, on the ground. The transmitter
+    # beside the array tilts the cut in which a pixel's targets lie.
+    r2 = np.hypot(13.0, lower[2] + 0.3)
+    assert float(listed["height of ambiguity"][:-2]) == pytest.approx(
+        0.0214137 * r2 / 0.3, rel=0.06
+    )
+    assert float(listed["resolution in x"][:-3]) == pytest.approx(2.14137 * r1 / 0.8, rel=0.01)
     # In the plan the transmitter stands where it is.
     plan = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("(c)"))
     spots = [line.get_xydata()[0] for line in plan.lines if len(line.get_xydata()) == 1]
@@ -761,13 +768,13 @@ def test_fig5_has_the_error_free_the_level_and_the_random_height_as_references(
     axes = draw("fig5", products, study).axes[0]
     levels = {line.get_ydata()[0] for line in axes.lines if len(set(line.get_ydata())) == 1}
     std = products["sweeps/vibration"]["std"].sel(region="whole_scene", motion_channels="common")
-    r1 = np.hypot(11.0, 2.0)
+    r2 = np.hypot(11.0, 2.3)
     wavelength = 299_792_458.0 / 14e9
-    # Vertical: B_perp = B sin(theta), so the height of ambiguity is lambda r1 / 2B.
+    # Vertical: the height of ambiguity is lambda r2 / 2B.
     expected = {
         100 * float(std.sel(motion_level_wavelengths=0).mean()),
         100 * float(products["truth"]["height"].std()),
-        100 * wavelength * r1 / (2 * 0.3) / np.sqrt(12),
+        100 * wavelength * r2 / (2 * 0.3) / np.sqrt(12),
     }
     assert sorted(levels) == pytest.approx(sorted(expected))
 
@@ -847,23 +854,23 @@ def test_baseline_length_shows_the_sweep_the_bound_and_the_optimum(
     np.testing.assert_allclose(lines["1.48 MAD, visible ground"].get_ydata(), robust)
     # Written out: the coherence of level ground, the looks of the window, the phase, the height.
     r1, wavelength, cell = np.hypot(11.0, 2.0), 299_792_458.0 / 14e9, 299_792_458.0 / 4e9
-    sine, cosine = 11 / r1, 2 / r1
-    across = np.array(length) * sine
-    critical = wavelength * r1 * sine / cosine / (2 * cell)
-    gamma = 1 - across / critical
-    looks = 0.25**2 / (wavelength * r1 / 1.6 * cell / sine)
+    r2 = np.hypot(11.0, 2.0 + np.array(length))
+    # The channels share the wavenumbers from 13 GHz at y / r1 to 15 GHz at y / r2.
+    gamma = (15 / r2 - 13 / r1) / (2 / np.sqrt(r1 * r2))
+    looks = 0.25**2 / (wavelength * r1 / 1.6 * cell * r1 / 11)
     phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
-    bound = wavelength * r1 * sine / (4 * np.pi * across) * phase
+    height = wavelength * r2 / (2 * np.array(length))
+    bound = height / (2 * np.pi) * phase
+    critical = np.sqrt((15 / 13 * r1) ** 2 - 11**2) - 2
     assert sweeps.looks(study, "baseline_length") == pytest.approx(looks)
     np.testing.assert_allclose(
         lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), 100 * bound
     )
-    height = wavelength * r1 * sine / (2 * across)
     np.testing.assert_allclose(ambiguity.lines[0].get_ydata(), height)
     np.testing.assert_allclose(coherence.lines[1].get_ydata(), gamma)
     for axes in figure.axes:
         marks = [line.get_xdata()[0] for line in axes.lines if len(set(line.get_xdata())) == 1]
-        assert any(mark == pytest.approx(critical / 4 / sine) for mark in marks)
+        assert any(mark == pytest.approx(critical / 4) for mark in marks)
     texts = written(figure, monkeypatch)
     assert "least: 2.00 cm at 0.3 m" in texts
     assert "within 10 % of it: 0.3 … 0.5 m" in texts
@@ -917,10 +924,11 @@ def test_snr_shows_the_sweep_and_the_bound(
         lines["std, whole scene"].get_ydata(), 100 * std.sel(region="whole_scene")
     )
     np.testing.assert_array_equal(lines["std, whole scene"].get_xdata(), ratio)
-    seen = baseline.view(study.radar, study.scene)
-    gamma = (1 - seen.across(0.3) / seen.critical_baseline) / (1 + 10 ** (-ratio / 10))
+    planned, place = Instrument.planned(study.radar), (0.0, 11.0)
+    gamma = planned.geometric_coherence(*place) / (1 + 10 ** (-ratio / 10))
     looks = sweeps.looks(study, "snr")
-    expected = 100 * seen.height_std_bound(0.3, gamma, looks)
+    phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
+    expected = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi) * phase
     np.testing.assert_allclose(
         lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), expected
     )

@@ -119,14 +119,15 @@ def test_measured_echoes_are_reported_without_the_scene_that_they_do_not_have() 
     text = next(b for b in section(found, "radar").blocks[1:] if isinstance(b, content.Text))
     assert "in the middle of the image at x = 0 m, y = 22 m" in text.text
     shown = {name: value for name, value, _ in content.quantities(study)}
-    assert shown["slant range of the lower antenna, r1"] == f"{np.hypot(22, 2):.3f}"
+    assert shown["slant range of the lower channel"] == f"{np.hypot(22, 2):.3f}"
 
 
-def test_derived_quantities_are_those_of_the_paper_s_equations() -> None:
+def test_derived_quantities_are_those_of_the_exact_geometry_and_of_the_paper_s_equations() -> None:
     shown = {name: value for name, value, _ in content.quantities(make_study())}
-    c, r1 = 299_792_458.0, np.hypot(13.0, 2.0)
+    c, r1, r2 = 299_792_458.0, np.hypot(13.0, 2.0), np.hypot(13.0, 2.3)
     wavelength, cell = c / 14e9, c / 4e9
-    critical = wavelength * r1 * (13 / 2) / (2 * cell)
+    # 13 GHz of the one channel and 15 GHz of the other see the same wavenumber of the ground.
+    critical = np.sqrt((15 / 13 * r1) ** 2 - 13**2) - 2
     expected = {
         "wavelength of the carrier, λ": 1000 * wavelength,
         "frequency step": 5,
@@ -135,14 +136,15 @@ def test_derived_quantities_are_those_of_the_paper_s_equations() -> None:
         "slant-range resolution": 100 * cell,
         "resolution on the ground in x": 100 * wavelength * r1 / 1.6,
         "resolution on the ground in y": 100 * cell * r1 / 13,
-        "slant range of the lower antenna, r1": r1,
-        "look angle from nadir, θ": np.degrees(np.arctan2(13, 2)),
-        "baseline across the line of sight, B⊥": 0.3 * 13 / r1,
-        "critical baseline, B_crit": critical,
+        "slant range of the lower channel": r1,
+        "its look angle from nadir, θ": np.degrees(np.arctan2(13, 2)),
+        "critical baseline of this attitude": critical,
         "a quarter of it, the rule of thumb": critical / 4,
-        "share of B_crit that is used": 100 * 0.3 * 13 / r1 / critical,
-        "height of ambiguity": wavelength * r1 / 0.6,
-        "spread of the height if the phase is random": 100 * wavelength * r1 / 0.6 / 12**0.5,
+        "coherence of level ground": (15 / r2 - 13 / r1) / (2 / np.sqrt(r1 * r2)),
+        "height of ambiguity": wavelength * r2 / 0.6,
+        "spread of the height if the phase is random": 100 * wavelength * r2 / 0.6 / 12**0.5,
+        "baseline across the line of sight, B⊥ (Eq. 4)": 0.3 * 13 / r1,
+        "critical B⊥ of a plane wave": wavelength * r1 * (13 / 2) / (2 * cell),
     }
     assert set(shown) == set(expected)
     for name, value in expected.items():

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import variables
-from vinsar.radar import aperture, geometry, waveform
+from vinsar.radar import aperture, formulas, waveform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -160,7 +160,7 @@ def _radial_shift(
     aperture_: aperture.Aperture, x: Floats, y: Floats, height: Floats
 ) -> tuple[Floats, Floats]:
     center = aperture_.center
-    return geometry.radial_shift(x - center[0], y - center[1], height, float(center[2]))
+    return formulas.radial_shift(x - center[0], y - center[1], height, float(center[2]))
 
 
 def _equal_path_shift(

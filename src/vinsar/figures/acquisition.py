@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.figures import style
-from vinsar.radar import geometry, waveform
+from vinsar.radar import formulas, geometry, instrument
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -374,27 +374,21 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         The radar; then, after an empty row, what follows for the target T.
     """
     scheme, options = layout(study), study.radar
-    wavelength = waveform.wavelength((options.start_frequency_hz + options.stop_frequency_hz) / 2)
-    bandwidth = options.stop_frequency_hz - options.start_frequency_hz
+    planned = instrument.Instrument.planned(options)
     r1, r2 = scheme.ranges
-    along, across = geometry.baseline_components(scheme.baseline, scheme.beta, scheme.look)
-    ambiguity = geometry.height_of_ambiguity(
-        r1, wavelength, scheme.baseline, scheme.beta, scheme.look
-    )
-    positions = round(options.aperture_length_m / options.position_spacing_m) + 1
-    azimuth = waveform.azimuth_resolution(wavelength, r1, options.aperture_length_m)
+    along, across = formulas.baseline_components(scheme.baseline, scheme.beta, scheme.look)
+    # On the ground below the target, straight ahead.
+    place = 0.0, scheme.target[0]
     if options.system == "rail":
         antennas = [
             ("aperture $L$", f"{options.aperture_length_m:g} m"),
-            ("positions", f"{positions}"),
+            ("positions", f"{planned.positions}"),
             ("rail height $H_0$", f"{options.rail_height_m:g} m"),
         ]
     else:
-        # One end of the path stands still: half the phase, and half the aperture's angle.
-        ambiguity, azimuth = 2 * ambiguity, 2 * azimuth
         antennas = [
             ("array $L$", f"{options.aperture_length_m:g} m"),
-            ("elements", f"{positions}"),
+            ("elements", f"{planned.positions}"),
             ("array height $H_0$", f"{options.rail_height_m:g} m"),
             ("transmitter height", f"{options.transmitter_height_m:g} m"),
         ]
@@ -403,8 +397,8 @@ def values(study: config.Study) -> list[tuple[str, str]]:
             "frequency",
             f"{options.start_frequency_hz / 1e9:g} … {options.stop_frequency_hz / 1e9:g} GHz",
         ),
-        (r"wavelength $\lambda$", f"{1000 * wavelength:.1f} mm"),
-        ("slant-range resolution", f"{100 * waveform.range_resolution(bandwidth):.1f} cm"),
+        (r"wavelength $\lambda$", f"{1000 * planned.wavelength:.1f} mm"),
+        ("slant-range resolution", f"{100 * planned.range_resolution:.1f} cm"),
         *antennas,
         ("baseline $B$", f"{scheme.baseline:g} m"),
         (r"baseline angle $\beta$", f"{options.baseline_angle_deg:g}°"),
@@ -413,8 +407,8 @@ def values(study: config.Study) -> list[tuple[str, str]]:
         (r"$\Delta r = r_1 - r_2$", _signed(1000 * (r1 - r2), ".1f", "mm")),
         ("$B_∥$", _signed(1000 * float(along), ".1f", "mm")),
         ("$B_⊥$", _signed(1000 * float(across), ".1f", "mm")),
-        ("height of ambiguity", _signed(float(ambiguity), ".3f", "m")),
-        ("resolution in x", f"{100 * float(azimuth):.1f} cm"),
+        ("height of ambiguity", f"{float(planned.height_of_ambiguity(*place)):.3f} m"),
+        ("resolution in x", f"{100 * float(planned.resolution(*place)[0]):.1f} cm"),
     ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from vinsar.figures import maps, style, sweeps
 from vinsar.foundations import variables
-from vinsar.radar import baseline
+from vinsar.radar import geometry, instrument, speckle
 from vinsar.study import config
 
 if TYPE_CHECKING:
@@ -58,18 +58,29 @@ def draw_length(products: Products, study: config.Study) -> Figure:
     sweep = variables.swept(products[f"sweeps/{name}"], "radar_baseline_m")
     sweep = sweep.sortby("radar_baseline_m")
     length = sweep["radar_baseline_m"].values
-    seen = baseline.view(
-        config.swept_section(study, name, "radar"), config.swept_section(study, name, "scene")
-    )
-    across = seen.critical_baseline / abs(np.cos(seen.baseline_angle - seen.look))
-    quarter = across / 4
+    radar = config.swept_section(study, name, "radar")
+    place = instrument.middle(config.swept_section(study, name, "scene"))
+    quarter = float(instrument.Instrument.planned(radar).critical_baseline(*place)) / 4
+    planned = [
+        instrument.Instrument.planned(radar.model_copy(update={"baseline_m": float(value)}))
+        for value in length
+    ]
+    ambiguity = np.array([float(part.height_of_ambiguity(*place)) for part in planned])
+    theory = np.array([float(part.geometric_coherence(*place)) for part in planned])
     height = 88.0
     figure = style.new_figure(style.TWO_COLUMNS_MM, height)
     left, bottom, width, tall = 13.0, 24.0, 88.0, 58.0
     limits = sweeps.around(length, [quarter], low=0.85, high=1.18)
 
     axes = style.place(figure, left, bottom, width, tall)
-    bounds = _bounds(sweep, seen, length, sweeps.looks(study, name))
+    count = sweeps.looks(study, name)
+    found, _, _ = sweeps.spread(sweep["coherence"])
+    bounds = {
+        f"bound, {source}, {count:.1f} looks": (
+            ambiguity / (2 * np.pi) * speckle.phase_std(coherence, count)
+        )
+        for source, coherence in (("level ground", theory), ("measured coherence", found))
+    }
     spreads = _spreads(axes, sweep, length)
     curves, _ = axes.get_legend_handles_labels()
     styles: list[Any] = ["--", ":"]
@@ -86,10 +97,8 @@ def draw_length(products: Products, study: config.Study) -> Figure:
     mark = _mark(axes, quarter)
 
     tops, small = (56.0, 24.0), 26.0
-    theory = baseline.geometric_coherence(seen.across(length), seen.critical_baseline)
     right, narrow = 121.0, 56.0
     upper = style.place(figure, right, tops[0], narrow, small)
-    ambiguity = seen.height_of_ambiguity(length)
     upper.plot(length, ambiguity, color=style.INK)
     _log_x(upper, limits)
     _log_y(upper, sweeps.around(ambiguity, low=0.8, high=1.25))
@@ -112,7 +121,7 @@ def draw_length(products: Products, study: config.Study) -> Figure:
     lower.set_title("(c) coherence, visible ground")
     lower.legend(
         handles=[lower.lines[0], *level],
-        labels=["measured", r"level ground, $1 - B_⊥/B_{crit}$"],
+        labels=["measured", "level ground"],
         loc="lower left",
     )
     for panel in (upper, lower):
@@ -131,20 +140,6 @@ def _spreads(axes: Axes, sweep: xr.Dataset, at: Floats) -> Floats:
     for data, look, scale in parts:
         sweeps.curve(axes, at, data, look, scale=scale)
     return np.concatenate([np.ravel(scale * data.values) for data, _, scale in parts])
-
-
-def _bounds(
-    sweep: xr.Dataset, seen: baseline.View, length: Floats, count: float
-) -> dict[str, Floats]:
-    """Return the Cramer-Rao bounds, m, by what the legend calls them."""
-    theory = baseline.geometric_coherence(seen.across(length), seen.critical_baseline)
-    found, _, _ = sweeps.spread(sweep["coherence"])
-    return {
-        f"bound, level ground, {count:.1f} looks": seen.height_std_bound(length, theory, count),
-        f"bound, measured coherence, {count:.1f} looks": seen.height_std_bound(
-            length, found, count
-        ),
-    }
 
 
 def best_lengths(sweep: xr.Dataset) -> tuple[float, float, float]:
@@ -227,7 +222,8 @@ def draw_angle(products: Products, study: config.Study) -> Figure:
     """
     product = products["baseline_angle"]
     beta = np.rad2deg(product["baseline_angle"].values)
-    look = np.rad2deg(baseline.view(study.radar, study.scene).look)
+    antenna, _ = instrument.Instrument.planned(study.radar).separated
+    look = float(np.rad2deg(geometry.look_angle(antenna, *instrument.middle(study.scene))))
     figure = style.new_figure(style.TWO_COLUMNS_MM, 71.0)
     bottom, tall = 16.5, 48.0
     length, angle = float(product["length_error"]), np.rad2deg(float(product["angle_error"]))

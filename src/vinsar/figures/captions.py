@@ -8,7 +8,7 @@ import numpy as np
 
 from vinsar.figures import acquisition, baselines, sweeps
 from vinsar.foundations import variables
-from vinsar.radar import baseline
+from vinsar.radar import geometry, instrument
 
 if TYPE_CHECKING:
     from vinsar.study import config
@@ -114,7 +114,8 @@ def baseline_angle(products: Products, study: config.Study) -> str:
         for name in ("length_drawn", "angle_drawn")
     )
     least = float(beta[int(np.argmin(product["length_exact"].values))])
-    look = np.degrees(baseline.view(study.radar, study.scene).look)
+    antenna, _ = instrument.Instrument.planned(study.radar).separated
+    look = np.degrees(geometry.look_angle(antenna, *instrument.middle(study.scene)))
     return (
         f"At {own:g}° the errors of length and attitude give {length:.2f} and {angle:.2f} mm. A "
         f"length error does least harm at {least:g}°; θ is {look:.2f}°."

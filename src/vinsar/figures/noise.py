@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vinsar.figures import style, sweeps
 from vinsar.foundations import variables
-from vinsar.radar import baseline
+from vinsar.radar import instrument, speckle
 from vinsar.study import config
 
 if TYPE_CHECKING:
@@ -40,12 +42,12 @@ def draw(products: Products, study: config.Study) -> Figure:
     sweep = variables.swept(products["sweeps/snr"], "echo_snr_db").sortby("echo_snr_db")
     ratio = sweep["echo_snr_db"].values
     radar = config.swept_section(study, "snr", "radar")
-    seen = baseline.view(radar, config.swept_section(study, "snr", "scene"))
-    coherence = baseline.noise_coherence(ratio) * baseline.geometric_coherence(
-        seen.across(radar.baseline_m), seen.critical_baseline
-    )
+    place = instrument.middle(config.swept_section(study, "snr", "scene"))
+    planned = instrument.Instrument.planned(radar)
+    coherence = speckle.noise_coherence(ratio) * planned.geometric_coherence(*place)
     count = sweeps.looks(study, "snr")
-    bound = 100 * seen.height_std_bound(radar.baseline_m, coherence, count)
+    per_radian = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi)
+    bound = per_radian * speckle.phase_std(coherence, count)
     figure = style.new_figure(style.ONE_COLUMN_MM, 91.0)
     axes = style.place(figure, 13.0, 33.0, 72.0, 52.0)
     values = []
@@ -62,7 +64,7 @@ def draw(products: Products, study: config.Study) -> Figure:
         linestyle="--",
         label=f"bound, level ground, {count:.1f} looks",
     )
-    random = 100 * float(seen.random_phase_std(radar.baseline_m))
+    random = 100 * float(planned.random_phase_std(*place))
     handles.append(
         axes.axhline(
             random,

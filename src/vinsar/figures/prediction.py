@@ -68,7 +68,7 @@ def draw_sheet(products: Products, study: config.Study) -> Figure:
 
 
 def _resolutions(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
-    across, ahead = 100 * sheet.resolution(y)
+    across, ahead = 100 * sheet.instrument.resolution(sheet.x, y)
     axes.plot(y, across, color=style.BLUE, label="along x (the rail)")
     axes.plot(y, ahead, color=style.ORANGE, linestyle=_DASHED, label="along y (ahead)")
     axes.axhline(
@@ -82,7 +82,8 @@ def _resolutions(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
 
 
 def _heights(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
-    cycle, shadow = sheet.height_of_ambiguity(y), sheet.shadow_length(y)
+    cycle = sheet.instrument.height_of_ambiguity(sheet.x, y)
+    shadow = sheet.shadow_length(y)
     relief = sheet.relief
     axes.plot(y, cycle, color=style.BLUE, label="height of ambiguity")
     values = [cycle.max(), relief]
@@ -119,7 +120,10 @@ def _noise(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
 def _scatter(axes: Axes, sheet: design.Sheet) -> None:
     highest = 0.0
     for axis, (label, colour, line) in enumerate(_OF_AXES):
-        std = [100 * sheet.scene_height_std(axis, level * sheet.wavelength) for level in _LEVELS]
+        std = [
+            100 * sheet.scene_height_std(axis, level * sheet.instrument.wavelength)
+            for level in _LEVELS
+        ]
         axes.plot(_LEVELS, std, color=colour, linestyle=line, label=label)
         highest = max(highest, *std)
     limit = _limit(axes, sheet)
@@ -259,7 +263,7 @@ def _by_errors(
             continue
         part = sweep.sel(motion_channels="independent", motion_axis=name)
         predicted = [
-            sheet.scene_height_std(axis, float(level) * sheet.wavelength)
+            sheet.scene_height_std(axis, float(level) * sheet.instrument.wavelength)
             for level in part["motion_level_wavelengths"].values
         ]
         found.append((name, (np.array(predicted), _spread(part)), colour))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.figures import style
-from vinsar.radar import trajectory, waveform
+from vinsar.radar import instrument
 from vinsar.study import config
 
 if TYPE_CHECKING:
@@ -149,15 +149,10 @@ def looks(study: config.Study, sweep: str) -> float:
     The window's area over that of a resolution cell in the middle of the scene. It stands for the
     averaging of the phase filter, which has no window of its own.
     """
-    radar_, scene, imaging, interferogram = (
+    radar, scene, imaging, interferogram = (
         config.swept_section(study, sweep, name)
         for name in ("radar", "scene", "imaging", "interferogram")
     )
-    cell = waveform.ground_resolution(
-        trajectory.apertures(trajectory.planned(radar_))[0],
-        (scene.x_min_m + scene.x_max_m) / 2,
-        (scene.y_min_m + scene.y_max_m) / 2,
-        frequency=np.array([radar_.start_frequency_hz, radar_.stop_frequency_hz]),
-    )
     side = interferogram.coherence_window_px * imaging.grid_spacing_m
-    return max(1.0, float(side**2 / (cell[0] * cell[1])))
+    planned = instrument.Instrument.planned(radar)
+    return float(planned.looks(side, *instrument.middle(scene)))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vinsar.figures import style, sweeps
 from vinsar.foundations import variables
-from vinsar.radar import baseline
+from vinsar.radar import instrument
 from vinsar.study import config
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ def draw(products: Products, study: config.Study) -> Figure:
     deviation = sweep["std"].sel(region="whole_scene")
     relief = float(products["truth"]["height"].std())
     radar = config.swept_section(study, "vibration", "radar")
-    seen = baseline.view(radar, config.swept_section(study, "vibration", "scene"))
-    random = float(seen.random_phase_std(radar.baseline_m))
+    place = instrument.middle(config.swept_section(study, "vibration", "scene"))
+    random = float(instrument.Instrument.planned(radar).random_phase_std(*place))
     figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
     # One scale for both panels: they are to be compared.
     limits = sweeps.around(100 * deviation.values, [100 * relief, 100 * random])

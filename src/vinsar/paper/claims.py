@@ -13,7 +13,7 @@ import numpy as np
 
 from vinsar.foundations import variables
 from vinsar.processing import detection
-from vinsar.radar import aperture, baseline, geometry, trajectory, waveform
+from vinsar.radar import aperture, formulas, geometry, instrument, trajectory
 from vinsar.study import config
 
 if TYPE_CHECKING:
@@ -214,23 +214,14 @@ def _registration_near_far(shifts: xr.Dataset) -> Claim:
     )
 
 
-def _scene_centre(study: config.Study) -> tuple[float, float]:
-    part = study.scene
-    return (part.x_min_m + part.x_max_m) / 2, (part.y_min_m + part.y_max_m) / 2
-
-
-def _wavelength(study: config.Study) -> float:
-    return waveform.wavelength((study.radar.start_frequency_hz + study.radar.stop_frequency_hz) / 2)
-
-
 def _height_per_baseline(study: config.Study, angle_deg: float) -> float:
     # By the exact inversion with a baseline that is wrong by a millimetre, not by Eq. 5 itself.
-    x, y = _scene_centre(study)
+    x, y = instrument.middle(study.scene)
     antenna, length = study.radar.rail_height_m, study.radar.baseline_m
     beta = np.deg2rad(angle_deg)
     lower = np.array([0.0, 0.0, antenna])
     upper = lower + length * np.array([0.0, np.cos(beta), np.sin(beta)])
-    wavelength = _wavelength(study)
+    wavelength = instrument.Instrument.planned(study.radar).wavelength
     r1 = geometry.slant_range(lower, x, y)
     phase = geometry.interferometric_phase(r1, geometry.slant_range(upper, x, y), wavelength)
     height = geometry.invert_height(
@@ -260,13 +251,16 @@ def _vertical_baseline(study: config.Study) -> Claim:
 
 
 def _critical_baseline(products: Products, study: config.Study) -> Claim:
-    x, _ = _scene_centre(study)
-    lower = np.array([0.0, 0.0, study.radar.rail_height_m])
-    look = geometry.look_angle(lower, x, study.scene.y_min_m)
-    range_ = geometry.slant_range(lower, x, study.scene.y_min_m)
-    cell = waveform.range_resolution(study.radar.stop_frequency_hz - study.radar.start_frequency_hz)
-    critical = float(geometry.critical_baseline(range_, _wavelength(study), look, cell))
-    _, across = geometry.baseline_components(
+    place = instrument.middle(study.scene)[0], study.scene.y_min_m
+    planned = instrument.Instrument.planned(study.radar)
+    look = planned.look_angle(*place)
+    # The paper's own formula, for a plane wave.
+    critical = float(
+        formulas.critical_baseline(
+            planned.slant_range(*place), planned.wavelength, look, planned.range_resolution
+        )
+    )
+    _, across = formulas.baseline_components(
         study.radar.baseline_m, np.deg2rad(study.radar.baseline_angle_deg), look
     )
     visible = ~products["truth"]["shadow"].values
@@ -277,7 +271,8 @@ def _critical_baseline(products: Products, study: config.Study) -> Claim:
         "1.2",
         "B < B_crit / 4",
         f"at the scene's near edge the baseline across the line of sight is {100 * share:.1f} % of "
-        f"B_crit = {critical:.2f} m; median coherence on visible ground {coherence:.3f}",
+        f"a plane wave's B_crit = {critical:.2f} m; median coherence on visible ground "
+        f"{coherence:.3f}",
         "reproduced if the share is below a quarter and the coherence above 3/4, what a quarter "
         "of B_crit leaves; partly if one holds",
         _verdict(share < 0.25 and coherence > 0.75, share < 0.25 or coherence > 0.75),
@@ -404,13 +399,7 @@ def _grown(mask: Flags, products: Products, study: config.Study) -> Flags:
     from scipy.ndimage import binary_dilation
 
     x, y = products["dem"]["x"].values, products["dem"]["y"].values
-    frequency = np.array([study.radar.start_frequency_hz, study.radar.stop_frequency_hz])
-    cell = waveform.ground_resolution(
-        trajectory.apertures(trajectory.planned(study.radar))[0],
-        x.mean(),
-        y.mean(),
-        frequency=frequency,
-    )
+    cell = instrument.Instrument.planned(study.radar).resolution(x.mean(), y.mean())
     across, ahead = (int(np.ceil(size / (x[1] - x[0]))) for size in cell)
     return binary_dilation(mask, np.ones((2 * ahead + 1, 2 * across + 1), bool))
 
@@ -524,13 +513,13 @@ class _Shaken:
             deviation.std("realization", ddof=1) if count > 1 else 0 * deviation.mean("realization")
         )
         radar_ = config.swept_section(study, "vibration", "radar")
-        seen = baseline.view(radar_, config.swept_section(study, "vibration", "scene"))
+        place = instrument.middle(config.swept_section(study, "vibration", "scene"))
         return cls(
             deviation.mean("realization"),
             scatter / np.sqrt(count),
             sweep["motion_level_wavelengths"].values,
             float(products["truth"]["height"].std()),
-            float(seen.random_phase_std(radar_.baseline_m)),
+            float(instrument.Instrument.planned(radar_).random_phase_std(*place)),
         )
 
     def lacks(self, *, level: float, least_count: int = 1) -> str:

@@ -1,9 +1,8 @@
 """What a configuration will do, predicted from its geometry and waveform without running it.
 
-All of it follows from the two apertures (`vinsar.radar.aperture`): path and slope of the lower one
-and the difference of the paths locate a target, so the inverse of their gradients tells what an
-error of phase or position does to its height, for any arrangement of antennas. On the paper's rail
-these are Eqs. 5 and 12 with their exact terms.
+Resolution, ambiguities and what an error of a path does to a height are the instrument's
+(`vinsar.radar.instrument`), for any arrangement of antennas; here they meet scene, image and noise.
+On the paper's rail the errors of the baseline are Eqs. 5 and 12 with their exact terms.
 """
 
 from __future__ import annotations
@@ -16,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.foundations.constants import AXES
-from vinsar.radar import aperture, baseline, geometry, trajectory, waveform
+from vinsar.radar import aperture, instrument, speckle, trajectory
+from vinsar.radar.instrument import Instrument
 from vinsar.study import validation
 
 if TYPE_CHECKING:
@@ -99,32 +99,9 @@ class Sheet:
         return trajectory.planned(self.study.radar)
 
     @cached_property
-    def apertures(self) -> list[aperture.Aperture]:
-        """The lower and the upper aperture."""
-        return trajectory.apertures(self.antennas)
-
-    @cached_property
-    def frequency(self) -> Floats:
-        """Frequencies, Hz."""
-        part = self.study.radar
-        return waveform.frequencies(
-            part.start_frequency_hz, part.stop_frequency_hz, part.frequency_count
-        )
-
-    @property
-    def wavelength(self) -> float:
-        """Wavelength of the carrier, m."""
-        return waveform.wavelength(waveform.carrier(self.frequency))
-
-    @property
-    def range_resolution(self) -> float:
-        """Slant-range resolution, m."""
-        return waveform.range_resolution(float(self.frequency[-1] - self.frequency[0]))
-
-    @property
-    def unambiguous_range(self) -> float:
-        """Slant range after which the waveform repeats, m."""
-        return waveform.unambiguous_range(float(self.frequency[1] - self.frequency[0]))
+    def instrument(self) -> Instrument:
+        """What follows from antennas and waveform alone."""
+        return Instrument.planned(self.study.radar)
 
     @property
     def farthest_range(self) -> float:
@@ -142,7 +119,7 @@ class Sheet:
     @property
     def samples(self) -> int:
         """Samples of a scan."""
-        return int(2 * self.antennas.sizes["position"] * self.frequency.size)
+        return 2 * self.instrument.positions * self.instrument.frequency.size
 
     @property
     def scan_duration(self) -> float:
@@ -175,49 +152,6 @@ class Sheet:
         part = self.study.imaging
         return np.array([part.y_min_m, (part.y_min_m + part.y_max_m) / 2, part.y_max_m])
 
-    def slant_range(self, y: ArrayLike) -> Floats:
-        """Return half the lower aperture's path to the middle of the image's rows, m."""
-        return aperture.path(self.apertures[0], self.x, y) / 2
-
-    def look(self, y: ArrayLike) -> Floats:
-        """Return the lower aperture's look angle from nadir, rad."""
-        return geometry.look_angle(self.apertures[0].center, self.x, y)
-
-    def resolution(self, y: ArrayLike) -> Floats:
-        """Return the resolution on the ground in x and y (2, ...), m."""
-        return waveform.ground_resolution(
-            self.apertures[0], self.x, np.asarray(y, float), frequency=self.frequency
-        )
-
-    def gradients(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Return the gradients of what locates targets (..., equation, axis).
-
-        Path and slope of the lower aperture, and its path less the upper one's.
-        """
-        lower, slope = aperture.gradients(self.apertures[0], x, y)
-        upper, _ = aperture.gradients(self.apertures[1], x, y)
-        return np.moveaxis(np.stack([lower, slope, lower - upper]), (0, 1), (-2, -1))
-
-    def height_per_difference(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Return the height's derivative by the difference of the paths, lower less upper, m/m."""
-        return np.asarray(np.linalg.inv(self.gradients(x, y))[..., 2, 2])
-
-    def height_of_ambiguity(self, y: ArrayLike) -> Floats:
-        """Return the height that turns the phase by a cycle, m, without its sign."""
-        return np.abs(self.wavelength * self.height_per_difference(self.x, y))
-
-    def turns_per_cell(self, y: ArrayLike) -> Floats:
-        """Return by how many cycles the phase of level ground turns in a range cell.
-
-        One cycle decorrelates the channels, so this is the baseline over the critical one.
-        """
-        slope = self.gradients(self.x, y)[..., 2, 1]
-        return np.abs(slope) * self.resolution(y)[1] / self.wavelength
-
-    def critical_baseline(self, y: ArrayLike) -> Floats:
-        """Return the baseline of the same attitude that decorrelates level ground, m."""
-        return self.study.radar.baseline_m / self.turns_per_cell(y)
-
     def snr_db(self, y: ArrayLike) -> Floats:
         """Return the signal-to-noise ratio of a range cell, dB; infinite without noise."""
         part = self.study.echo
@@ -226,8 +160,8 @@ class Sheet:
             return np.full(y.shape, np.inf)
         if not part.spreading:
             return np.full(y.shape, part.snr_db)
-        middle = self.slant_range((self.scene.y_min_m + self.scene.y_max_m) / 2)
-        return part.snr_db - 40 * np.log10(self.slant_range(y) / middle)
+        middle = self.instrument.slant_range(self.x, instrument.middle(self.scene)[1])
+        return part.snr_db - 40 * np.log10(self.instrument.slant_range(self.x, y) / middle)
 
     def coherence(self, y: ArrayLike, position_errors: ArrayLike = 0.0) -> Floats:
         """Return the coherence that baseline, noise and position errors leave.
@@ -251,11 +185,10 @@ class Sheet:
         """
         part = self.scene
         focused = np.exp(-(np.asarray(position_errors, float) ** 2))
-        left, right = (self.growth(x, y) for x in (part.x_min_m, part.x_max_m))
-        filled = np.minimum(1, np.abs(right - left) / self.wavelength)
+        filled = np.minimum(1, self.instrument.filled(part.x_min_m, part.x_max_m, y))
         return np.asarray(
-            np.clip(1 - self.turns_per_cell(y), 0, 1)
-            * baseline.noise_coherence(self.snr_db(y))
+            self.instrument.geometric_coherence(self.x, y)
+            * speckle.noise_coherence(self.snr_db(y))
             * focused
             / (focused + (1 - focused) * filled)
         )
@@ -263,13 +196,13 @@ class Sheet:
     def looks(self, y: ArrayLike) -> Floats:
         """Return the independent looks in the coherence window, at least 1."""
         side = self.study.interferogram.coherence_window_px * self.study.imaging.grid_spacing_m
-        return np.maximum(1, side**2 / self.resolution(y).prod(axis=0))
+        return self.instrument.looks(side, self.x, y)
 
     def height_std(self, y: ArrayLike, position_errors: ArrayLike = 0.0) -> Floats:
         """Return the predicted standard deviation of the height on visible ground, m.
 
         The Cramer-Rao bound of the phase for the looks of the coherence window, and no more than a
-        random phase makes (`baseline.phase_std`). The phase filter averages over more than the
+        random phase makes (`speckle.phase_std`). The phase filter averages over more than the
         window, and speckle has tails: as long as the phase unwraps, the prediction is good within a
         factor of 2.5, high rather than low where noise decides.
 
@@ -285,9 +218,9 @@ class Sheet:
         ndarray
             Standard deviation, m.
         """
-        phase = baseline.phase_std(self.coherence(y, position_errors), self.looks(y))  # type: ignore[arg-type]
-        cycle = self.height_of_ambiguity(y)
-        return np.minimum(cycle / (2 * np.pi) * phase, cycle / np.sqrt(12))
+        phase = speckle.phase_std(self.coherence(y, position_errors), self.looks(y))
+        per_radian = self.instrument.height_of_ambiguity(self.x, y) / (2 * np.pi)
+        return np.minimum(per_radian * phase, self.instrument.random_phase_std(self.x, y))
 
     def scene_height_std(self, axis: int = 0, position_std_m: float = 0.0) -> float:
         """Return the predicted height noise over the image: the root of its mean square, m.
@@ -304,45 +237,12 @@ class Sheet:
         errors = position_std_m * self.phase_per_position(x, y, axis)
         return float(np.sqrt(np.mean(self.height_std(y, errors) ** 2)))
 
-    def growth(self, x: float, y: ArrayLike) -> Floats:
-        """Return by how much the path grows from one position to the next, in the mean, m."""
-        y = np.asarray(y, float)
-        target = np.stack(np.broadcast_arrays(x, y, 0.0), axis=-1)
-        first, last = (
-            sum(
-                np.linalg.norm(target - self.antennas[end].values[0, number], axis=-1)
-                for end in ("transmitter", "receiver")
-            )
-            for number in (0, -1)
-        )
-        return np.asarray(last - first) / (self.antennas.sizes["position"] - 1)
-
-    def unambiguous_width(self, y: float) -> float:
-        """Return the width along x that the spacing of the positions images once, m.
-
-        Two targets look alike when the paths to them grow from each position to the next by amounts
-        that differ by a wavelength (grating lobes). Infinite if that never happens.
-        """
-        from scipy.optimize import brentq
-
-        shortest = waveform.wavelength(float(self.frequency[-1]))
-
-        def excess(width: float) -> float:
-            left, right = (self.growth(self.x + side * width / 2, y) for side in (-1, 1))
-            return float(abs(right - left)) - shortest
-
-        widest = 1e4
-        return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
-
     def shadow_length(self, y: ArrayLike) -> Floats:
         """Return how far an obstacle as high as the scene's relief hides the ground behind it, m.
 
         Infinite where it is as high as the lowest antenna.
         """
-        lowest = min(
-            float(end[2]) for part in self.apertures for end in (part.transmitter, part.receiver)
-        )
-        height = self.relief
+        height, lowest = self.relief, self.instrument.lowest
         if height >= lowest:
             return np.full(np.shape(y), np.inf)
         return np.asarray(y, float) * height / (lowest - height)
@@ -351,7 +251,8 @@ class Sheet:
         """Return by how much the images of a target as high as the relief differ in y, m."""
         height = self.relief
         lower, upper = (
-            aperture.image_position(part, self.x, y, height)[1] for part in self.apertures
+            aperture.image_position(part, self.x, y, height)[1]
+            for part in (self.instrument.lower, self.instrument.upper)
         )
         return np.abs(lower - upper)
 
@@ -375,7 +276,7 @@ class Sheet:
         """
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         target = np.stack([x, y, np.zeros(x.shape)], axis=-1)
-        lower, upper = self.apertures
+        lower, upper = self.instrument.lower, self.instrument.upper
         path = np.zeros(x.shape)
         for mine, other in (
             (upper.transmitter, lower.transmitter),
@@ -385,7 +286,7 @@ class Sheet:
                 line = target - mine
                 path -= line @ direction / np.linalg.norm(line, axis=-1)
         # The difference as told, lower less upper, has to stay as it was measured.
-        return self.height_per_difference(x, y) * path
+        return self.instrument.height_per_difference(x, y) * path
 
     def _reference(self) -> tuple[Floats, Floats]:
         """Return points that fix the phase constant: corners of level ground, or control points."""
@@ -410,11 +311,10 @@ class Sheet:
         list of Tolerance
             Length and attitude of the baseline (Eqs. 5 and 12), and offsets along the axes.
         """
-        lower, upper = self.apertures
-        line = upper.center - lower.center
-        along = line / np.linalg.norm(line)
+        lower, upper = self.instrument.separated
+        along = (upper - lower) / self.instrument.baseline
         # In the plane across the aperture, upwards from horizontal.
-        turned = np.array([0.0, -along[2], along[1]]) * self.study.radar.baseline_m
+        turned = np.array([0.0, -along[2], along[1]]) * self.instrument.baseline
         degree = np.pi / 180
         cases: Mapping[str, tuple[str, float, Floats]] = {
             "length of the baseline (Eq. 5)": ("mm", 1e-3, along),
@@ -433,10 +333,11 @@ class Sheet:
         )
         error = size * self.height_per_offset(x, y, direction)
         points = self._reference()
+        per_difference = self.instrument.height_per_difference
         constant = np.median(
-            size * self.height_per_offset(*points, direction) / self.height_per_difference(*points)
+            size * self.height_per_offset(*points, direction) / per_difference(*points)
         )
-        referenced = error - constant * self.height_per_difference(x, y)
+        referenced = error - constant * per_difference(x, y)
         most = self.study.accuracy.tolerance_m
         return Tolerance(
             name,
@@ -453,7 +354,7 @@ class Sheet:
         """
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         target = np.stack([x, y, np.zeros(x.shape)], axis=-1)
-        lower = self.apertures[0]
+        lower = self.instrument.lower
         slope = np.zeros(x.shape)
         for end, travel in (
             (lower.transmitter, lower.transmitter_travel),
@@ -462,7 +363,7 @@ class Sheet:
             if travel.any():
                 line = target - end
                 slope += line[..., axis] / np.linalg.norm(line, axis=-1)
-        return 2 * np.pi / self.wavelength * np.abs(slope)
+        return 2 * np.pi / self.instrument.wavelength * np.abs(slope)
 
     def tolerated_scatter(self, axis: int) -> float:
         """Return which white position errors keep 95 % of the heights within the tolerance, m.
@@ -489,7 +390,7 @@ class Sheet:
 
         if excess(0.0) > 0:
             return 0.0
-        largest = self.wavelength
+        largest = self.instrument.wavelength
         return float(brentq(excess, 0.0, largest)) if excess(largest) > 0 else math.inf
 
     def coupling_db(self) -> float | None:
@@ -506,9 +407,11 @@ class Sheet:
             or self.study.imaging.range_window != "rectangular"
         ):
             return None
-        ends = np.array([float(self.slant_range(self.places[0])), self.farthest_range])
-        turn = np.pi * (ends - self.study.echo.coupling_path_m / 2) / self.unambiguous_range
-        return level - 20 * math.log10(self.frequency.size * float(np.abs(np.sin(turn)).min()))
+        nearest = float(self.instrument.slant_range(self.x, self.places[0]))
+        ends = np.array([nearest, self.farthest_range])
+        period, count = self.instrument.unambiguous_range, self.instrument.frequency.size
+        turn = np.pi * (ends - self.study.echo.coupling_path_m / 2) / period
+        return level - 20 * math.log10(count * float(np.abs(np.sin(turn)).min()))
 
     def warnings(self) -> list[str]:
         """Return what is unwise, a sentence each, in the order of the chain.
@@ -516,14 +419,14 @@ class Sheet:
         The whole configuration is read (`validation.advice`).
         """
         found = validation.advice(self.study)
-        y = self.places
-        if self.farthest_range > _RANGE_SHARE * self.unambiguous_range:
+        y, planned = self.places, self.instrument
+        if self.farthest_range > _RANGE_SHARE * planned.unambiguous_range:
             found.append(
-                f"radar.frequency_count = {self.frequency.size}: the farthest slant range, "
+                f"radar.frequency_count = {planned.frequency.size}: the farthest slant range, "
                 f"{self.farthest_range:.2f} m, is nearly the unambiguous range, "
-                f"{self.unambiguous_range:.2f} m: what lies behind the scene folds into it"
+                f"{planned.unambiguous_range:.2f} m: what lies behind the scene folds into it"
             )
-        widths = np.array([self.unambiguous_width(float(at)) for at in y])
+        widths = np.array([planned.unambiguous_width(self.x, float(at)) for at in y])
         width = self.scene.x_max_m - self.scene.x_min_m
         if width > _WIDTH_SHARE * widths.min():
             found.append(
@@ -531,7 +434,7 @@ class Sheet:
                 f"{width:g} m wide and {widths.min():.2f} m are imaged once: what lies beside it "
                 "folds into it"
             )
-        cell = float(self.resolution(y).min())
+        cell = float(planned.resolution(self.x, y).min())
         if self.study.imaging.grid_spacing_m > cell / 2:
             found.append(
                 f"imaging.grid_spacing_m = {self.study.imaging.grid_spacing_m}: above half the "
@@ -550,13 +453,13 @@ class Sheet:
                 f"accuracy.tolerance_m = {self.study.accuracy.tolerance_m}: the predicted noise of "
                 f"{100 * std.max():.1f} cm leaves fewer than 95 % of the heights within it"
             )
-        share = float((self.registration_shift(y) / self.resolution(y)[1]).max())
+        share = float((self.registration_shift(y) / planned.resolution(self.x, y)[1]).max())
         if share > _REGISTRATION_SHARE:
             found.append(
                 f"scene: the images of a target as high as the relief, {self.relief:g} m, "
                 f"differ by {share:.2f} of a resolution cell, more than a tenth"
             )
-        cycle, relief = float(self.height_of_ambiguity(y).min()), self.relief
+        cycle, relief = float(planned.height_of_ambiguity(self.x, y).min()), self.relief
         if relief > 2 * cycle:
             found.append(
                 f"radar.baseline_m = {self.study.radar.baseline_m}: the height of ambiguity, "
@@ -593,18 +496,19 @@ def as_markdown(sheet: Sheet) -> str:
         Tables of what is predicted, and the warnings.
     """
     study, y = sheet.study, sheet.places
-    part = study.radar
+    part, planned = study.radar, sheet.instrument
+    place = sheet.x, y
     megabytes = sheet.samples * _BYTES_PER_SAMPLE / 1e6
     lines = [
         f"# Design of the study {study.study}",
         "",
         f"- {part.system}, {part.start_frequency_hz / 1e9:g} to {part.stop_frequency_hz / 1e9:g} "
-        f"GHz in {sheet.frequency.size} steps, {sheet.antennas.sizes['position']} positions over "
+        f"GHz in {planned.frequency.size} steps, {planned.positions} positions over "
         f"{part.aperture_length_m:g} m, baseline of {part.baseline_m:g} m at "
         f"{part.baseline_angle_deg:g} deg",
-        f"- wavelength {1e3 * sheet.wavelength:.2f} mm, slant-range resolution "
-        f"{1e2 * sheet.range_resolution:.2f} cm",
-        f"- unambiguous range {sheet.unambiguous_range:.2f} m; the farthest target is at "
+        f"- wavelength {1e3 * planned.wavelength:.2f} mm, slant-range resolution "
+        f"{1e2 * planned.range_resolution:.2f} cm",
+        f"- unambiguous range {planned.unambiguous_range:.2f} m; the farthest target is at "
         f"{sheet.farthest_range:.2f} m",
         f"- {sheet.samples} complex samples a scan of {sheet.scan_duration:.3g} s, "
         f"{megabytes:.2f} MB in single precision; the vehicle drives "
@@ -615,21 +519,21 @@ def as_markdown(sheet: Sheet) -> str:
         "| | near | middle | far |",
         "|---|---:|---:|---:|",
     ]
-    resolution = sheet.resolution(y)
+    resolution, critical = planned.resolution(*place), planned.critical_baseline(*place)
     rows: list[tuple[str, Any, str]] = [
         ("distance ahead y (m)", y, ".2f"),
-        ("slant range (m)", sheet.slant_range(y), ".2f"),
-        ("look angle from nadir (deg)", np.rad2deg(sheet.look(y)), ".2f"),
+        ("slant range (m)", planned.slant_range(*place), ".2f"),
+        ("look angle from nadir (deg)", np.rad2deg(planned.look_angle(*place)), ".2f"),
         ("resolution in y (cm)", 100 * resolution[1], ".2f"),
         ("resolution in x (cm)", 100 * resolution[0], ".2f"),
         (
             "width imaged without grating lobes (m)",
-            [sheet.unambiguous_width(float(at)) for at in y],
+            [planned.unambiguous_width(sheet.x, float(at)) for at in y],
             ".2f",
         ),
-        ("critical baseline of this attitude (m)", sheet.critical_baseline(y), ".2f"),
-        ("a quarter of it (m)", sheet.critical_baseline(y) / 4, ".2f"),
-        ("height of ambiguity (m)", sheet.height_of_ambiguity(y), ".3f"),
+        ("critical baseline of this attitude (m)", critical, ".2f"),
+        ("a quarter of it (m)", critical / 4, ".2f"),
+        ("height of ambiguity (m)", planned.height_of_ambiguity(*place), ".3f"),
         ("coherence of level ground", sheet.coherence(y), ".3f"),
         ("looks of the coherence window", sheet.looks(y), ".1f"),
         ("predicted height noise, 1 sigma (cm)", 100 * sheet.height_std(y), ".2f"),
@@ -663,7 +567,7 @@ def as_markdown(sheet: Sheet) -> str:
     ]
     for axis, name in enumerate(AXES):
         std = sheet.tolerated_scatter(axis)
-        lines.append(f"| {name} | {_amount(1e3 * std)} | {_amount(std / sheet.wavelength)} |")
+        lines.append(f"| {name} | {_amount(1e3 * std)} | {_amount(std / planned.wavelength)} |")
     found = sheet.warnings()
     lines += ["", "Warnings:", ""] if found else ["", "No warnings."]
     lines += [f"- {sentence}" for sentence in found]

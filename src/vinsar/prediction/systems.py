@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from vinsar.foundations import variables
 from vinsar.foundations.constants import CHANNELS
-from vinsar.radar import aperture, trajectory, waveform
+from vinsar.radar import instrument, trajectory
 from vinsar.study import config
 
 if TYPE_CHECKING:
@@ -73,21 +71,16 @@ def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
     found = []
     for number, changes in enumerate(over["radar"]):
         radar_ = common.model_copy(update=changes)
-        lower, upper = trajectory.apertures(trajectory.planned(radar_))
-        frequency = np.array([radar_.start_frequency_hz, radar_.stop_frequency_hz])
-        middle = (scene.x_min_m + scene.x_max_m) / 2, (scene.y_min_m + scene.y_max_m) / 2
-        across, ahead = waveform.ground_resolution(lower, *middle, frequency=frequency)
-        wavelength = waveform.wavelength(waveform.carrier(frequency))
-        positions = round(radar_.aperture_length_m / radar_.position_spacing_m) + 1
-        samples = len(CHANNELS) * positions * radar_.frequency_count
+        planned = instrument.Instrument.planned(radar_)
+        place = instrument.middle(scene)
+        across, ahead = planned.resolution(*place)
+        samples = len(CHANNELS) * planned.positions * radar_.frequency_count
         found.append(
             System(
                 name=f"{_NAMES[radar_.system]}, {radar_.aperture_length_m:g} m",
-                positions=positions,
+                positions=planned.positions,
                 resolution_m=(float(across), float(ahead)),
-                height_of_ambiguity_m=float(
-                    aperture.height_of_ambiguity(lower, upper, *middle, wavelength)
-                ),
+                height_of_ambiguity_m=float(planned.height_of_ambiguity(*place)),
                 scan_time_s=trajectory.scan_duration(radar_, study.vehicle, samples),
                 accuracy=statistics.isel(radar=number),
             )

@@ -14,7 +14,7 @@ import numpy as np
 
 from vinsar.foundations import variables
 from vinsar.processing import height
-from vinsar.radar import aperture, baseline, geometry, trajectory
+from vinsar.radar import aperture, geometry, speckle, trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -219,7 +219,7 @@ def detect(
     dark = ~(coded(np.where(shaded > 0, 1.0, 0.0)) < 0.5) | ~np.isfinite(found)
     coherence = np.clip(interferogram["coherence"].values, _LEAST_COHERENCE, 1)
     # The Cramer-Rao bound of the phase.
-    noise = coded(np.abs(height_by_phase) * baseline.phase_std(coherence, looks))
+    noise = coded(np.abs(height_by_phase) * speckle.phase_std(coherence, looks))
     surface = ground(np.where(dark, np.nan, found), x, y, options.ground_window_m)
     residual = found - surface
     certain = ~dark & (np.abs(residual) > options.noise_factor * noise)

@@ -282,36 +282,6 @@ def locate(
     return place[0], place[1], place[2]
 
 
-def height_of_ambiguity(
-    lower: Aperture, upper: Aperture, x: ArrayLike, y: ArrayLike, wavelength_m: float
-) -> Floats:
-    """Return the height that turns the phase of a pixel by a cycle, m.
-
-    A target of the pixel moves with its height along ``t = grad path_1 x grad slope_1``; the phase
-    turns by ``2 pi / lambda (t . grad path_2) / t_z`` for each metre. On a rail that is
-    ``lambda r2 / 2B`` for a vertical baseline (`geometry.height_of_ambiguity` for a plane wave);
-    with one end of the path common to both channels it is twice that.
-
-    Parameters
-    ----------
-    lower, upper
-        The two apertures.
-    x, y
-        Pixels on the ground plane, m, of shapes that broadcast.
-    wavelength_m
-        Wavelength, m.
-
-    Returns
-    -------
-    ndarray
-        Height, m, without its sign.
-    """
-    length, slope = gradients(lower, x, y)
-    other, _ = gradients(upper, x, y)
-    along = np.cross(length, slope, axis=0)
-    return np.abs(wavelength_m * along[2] / (along * other).sum(axis=0))
-
-
 def _above_each_other(lower: Aperture, upper: Aperture) -> bool:
     # Recorded positions with errors of their own differ along x by what the errors make.
     apart = abs(float(lower.center[0] - upper.center[0]))

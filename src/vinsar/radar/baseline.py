@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import variables
-from vinsar.radar import geometry, waveform
+from vinsar.radar import formulas, geometry, waveform
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,7 +73,7 @@ class View:
     def critical_baseline(self) -> float:
         """Baseline across the line of sight that decorrelates level ground, m."""
         return float(
-            geometry.critical_baseline(
+            formulas.critical_baseline(
                 self.slant_range, self.wavelength_m, self.look, self.range_resolution_m
             )
         )
@@ -81,27 +81,6 @@ class View:
     def across(self, baseline_m: ArrayLike) -> Floats:
         """Return the length of the baseline across the line of sight, m."""
         return np.asarray(baseline_m) * abs(np.cos(self.baseline_angle - self.look))
-
-    def height_of_ambiguity(self, baseline_m: ArrayLike) -> Floats:
-        """Return the height that turns the phase by a cycle, m, without its sign."""
-        reach = self.wavelength_m * self.slant_range * np.sin(self.look)
-        return reach / (2 * self.across(baseline_m))
-
-    def random_phase_std(self, baseline_m: ArrayLike) -> Floats:
-        """Return the standard deviation of the height under a phase that is noise, m.
-
-        A phase uniform over a cycle makes heights uniform over the height of ambiguity:
-        ``lambda r1 sin(theta) / (2 B_perp) / sqrt(12)``.
-        """
-        return self.height_of_ambiguity(baseline_m) / np.sqrt(12)
-
-    def height_std_bound(self, baseline_m: ArrayLike, coherence: ArrayLike, looks: float) -> Floats:
-        """Return the Cramer-Rao bound of the height's standard deviation, m.
-
-        ``(lambda r1 sin(theta) / (4 pi B_perp)) sqrt((1 - gamma^2) / (2 N gamma^2))``, with the
-        coherence gamma and N independent looks.
-        """
-        return self.height_of_ambiguity(baseline_m) / (2 * np.pi) * phase_std(coherence, looks)
 
 
 def view(radar_: config.Radar, scene: config.Scene) -> View:
@@ -136,39 +115,6 @@ def view(radar_: config.Radar, scene: config.Scene) -> View:
         range_resolution_m=waveform.range_resolution(float(band[1] - band[0])),
         baseline_angle=float(np.deg2rad(radar_.baseline_angle_deg)),
     )
-
-
-def geometric_coherence(across_m: ArrayLike, critical_m: float) -> Floats:
-    """Return the coherence that a baseline leaves level ground, ``1 - B_perp / B_crit`` or none."""
-    return np.clip(1 - np.abs(across_m) / critical_m, 0, 1)
-
-
-def noise_coherence(snr_db: ArrayLike) -> Floats:
-    """Return the coherence that thermal noise leaves, ``1 / (1 + 1 / SNR)``."""
-    return 1 / (1 + 10 ** (-np.asarray(snr_db, float) / 10))
-
-
-def phase_std(coherence: ArrayLike, looks: float) -> Floats:
-    """Return the Cramer-Rao bound of the interferometric phase's standard deviation, rad.
-
-    ``sqrt((1 - gamma^2) / (2 N gamma^2))`` (Rodriguez and Martin 1992). It is reached with many
-    looks and high coherence; without coherence it is infinite.
-
-    Parameters
-    ----------
-    coherence
-        Coherence gamma, 0 to 1.
-    looks
-        Number N of independent looks.
-
-    Returns
-    -------
-    ndarray
-        Standard deviation, rad.
-    """
-    gamma = np.asarray(coherence, float)
-    with np.errstate(divide="ignore"):
-        return np.sqrt((1 - gamma**2) / (2 * looks)) / gamma
 
 
 def height_per_length(seen: View, baseline_m: float, baseline_angle: ArrayLike) -> Floats:
@@ -255,8 +201,8 @@ def angle_errors(
 
     # Each attitude has draws of its own: its neighbours show how far chance carries it.
     unit = rng.standard_normal((2, angles.size, draws))
-    eq5 = geometry.height_per_baseline_length(seen.slant_range, baseline_m, angles[:, 0], seen.look)
-    eq12 = geometry.height_per_baseline_angle(seen.slant_range, seen.look)
+    eq5 = formulas.height_per_baseline_length(seen.slant_range, baseline_m, angles[:, 0], seen.look)
+    eq12 = formulas.height_per_baseline_angle(seen.slant_range, seen.look)
     exact = height_per_length(seen, baseline_m, angles[:, 0])
     return variables.dataset(
         "baseline_angle",

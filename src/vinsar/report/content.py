@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.figures import FIGURES, height_error, sweeps, thumbnails
-from vinsar.radar import baseline, trajectory, waveform
+from vinsar.radar import formulas, instrument
 from vinsar.results import lineage
 from vinsar.study import config, pipeline
 
@@ -319,18 +319,17 @@ def _radar(study: config.Study) -> Section:
             Text("The values of the paper's Table 1 and those that it leaves open."),
             given,
             Text(
-                f"What follows from them, in the middle of the {place} at x = {middle.x_m:g} m, "
-                f"y = {middle.y_m:g} m on the ground:"
+                f"What follows from them, in the middle of the {place} at x = {middle[0]:g} m, "
+                f"y = {middle[1]:g} m on the ground:"
             ),
             derived,
         ),
     )
 
 
-def _middle(study: config.Study) -> baseline.View:
+def _middle(study: config.Study) -> tuple[float, float]:
     # Measured echoes come without a scene.
-    area: Any = study.imaging if study.measurement.file is not None else study.scene
-    return baseline.view(study.radar, area)
+    return instrument.middle(study.imaging if study.measurement.file is not None else study.scene)
 
 
 def quantities(study: config.Study) -> list[tuple[str, str, str]]:
@@ -345,36 +344,45 @@ def quantities(study: config.Study) -> list[tuple[str, str, str]]:
     -------
     list of tuple of str
         Wavelength, resolutions, unambiguous range, and what the baseline means for coherence and
-        phase, in the middle of the scene, or of the image where the echoes are measured.
+        phase, in the middle of the scene, or of the image where the echoes are measured. On a
+        rail, the paper's formulas for a plane wave as well.
     """
-    options = study.radar
-    seen = _middle(study)
-    frequency = waveform.frequencies(
-        options.start_frequency_hz, options.stop_frequency_hz, options.frequency_count
-    )
-    antennas = trajectory.planned(options)
-    lower = trajectory.apertures(antennas)[0]
-    cell = waveform.ground_resolution(lower, seen.x_m, seen.y_m, frequency=frequency)
-    across = float(seen.across(options.baseline_m))
-    ambiguity = float(seen.height_of_ambiguity(options.baseline_m))
-    step = float(frequency[1] - frequency[0])
-    return [
-        ("wavelength of the carrier, λ", f"{1000 * seen.wavelength_m:.2f}", "mm"),
-        ("frequency step", f"{step / 1e6:g}", "MHz"),
-        ("unambiguous range", f"{waveform.unambiguous_range(step):.2f}", "m"),
-        ("antenna positions", f"{antennas.sizes['position']}", ""),
-        ("slant-range resolution", f"{100 * seen.range_resolution_m:.2f}", "cm"),
-        ("resolution on the ground in x", f"{100 * float(cell[0]):.1f}", "cm"),
-        ("resolution on the ground in y", f"{100 * float(cell[1]):.1f}", "cm"),
-        ("slant range of the lower antenna, r1", f"{seen.slant_range:.3f}", "m"),
-        ("look angle from nadir, θ", f"{np.degrees(seen.look):.2f}", "°"),
-        ("baseline across the line of sight, B⊥", f"{across:.4f}", "m"),
-        ("critical baseline, B_crit", f"{seen.critical_baseline:.2f}", "m"),
-        ("a quarter of it, the rule of thumb", f"{seen.critical_baseline / 4:.2f}", "m"),
-        ("share of B_crit that is used", f"{100 * across / seen.critical_baseline:.1f}", "%"),
-        ("height of ambiguity", f"{ambiguity:.3f}", "m"),
-        ("spread of the height if the phase is random", f"{100 * ambiguity / 12**0.5:.1f}", "cm"),
+    options, place = study.radar, _middle(study)
+    planned = instrument.Instrument.planned(options)
+    slant, look = float(planned.slant_range(*place)), float(planned.look_angle(*place))
+    cell = 100 * planned.resolution(*place)
+    critical = float(planned.critical_baseline(*place))
+    rows = [
+        ("wavelength of the carrier, λ", f"{1000 * planned.wavelength:.2f}", "mm"),
+        ("frequency step", f"{planned.frequency_step / 1e6:g}", "MHz"),
+        ("unambiguous range", f"{planned.unambiguous_range:.2f}", "m"),
+        ("antenna positions", f"{planned.positions}", ""),
+        ("slant-range resolution", f"{100 * planned.range_resolution:.2f}", "cm"),
+        ("resolution on the ground in x", f"{cell[0]:.1f}", "cm"),
+        ("resolution on the ground in y", f"{cell[1]:.1f}", "cm"),
+        ("slant range of the lower channel", f"{slant:.3f}", "m"),
+        ("its look angle from nadir, θ", f"{np.degrees(look):.2f}", "°"),
+        ("critical baseline of this attitude", f"{critical:.2f}", "m"),
+        ("a quarter of it, the rule of thumb", f"{critical / 4:.2f}", "m"),
+        ("coherence of level ground", f"{float(planned.geometric_coherence(*place)):.3f}", ""),
+        ("height of ambiguity", f"{float(planned.height_of_ambiguity(*place)):.3f}", "m"),
+        (
+            "spread of the height if the phase is random",
+            f"{100 * float(planned.random_phase_std(*place)):.1f}",
+            "cm",
+        ),
     ]
+    if options.system == "rail":
+        attitude = np.deg2rad(options.baseline_angle_deg)
+        _, across = formulas.baseline_components(options.baseline_m, attitude, look)
+        plane_wave = formulas.critical_baseline(
+            slant, planned.wavelength, look, planned.range_resolution
+        )
+        rows += [
+            ("baseline across the line of sight, B⊥ (Eq. 4)", f"{abs(float(across)):.4f}", "m"),
+            ("critical B⊥ of a plane wave", f"{float(plane_wave):.2f}", "m"),
+        ]
+    return rows
 
 
 def _changes(sources: Sources) -> Section | None:

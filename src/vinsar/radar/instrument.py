@@ -1,0 +1,312 @@
+"""What a radar can do, from its antennas and its waveform alone: each quantity derived once.
+
+Wavelength, resolution, ambiguities in range, width and height, and the critical baseline, for any
+arrangement of antennas. All of it follows from the two apertures (`vinsar.radar.aperture`): path
+and slope of the lower one and the difference of the paths locate a target, and the gradients of
+these three on the ground tell the rest. On the paper's rail they are its formulas without the
+plane wave (`vinsar.radar.formulas`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar.radar import aperture, geometry, trajectory, waveform
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+    from vinsar.study import config
+
+    Floats = NDArray[np.floating]
+
+# Lengths among which the critical baseline is looked for, in units of the baseline.
+_FACTORS = np.geomspace(1e-3, 1e5, 161)
+_BISECTIONS = 50
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """Two apertures and a stepped waveform.
+
+    Attributes
+    ----------
+    lower, upper
+        The apertures of the channels.
+    positions
+        Number of antenna positions of a channel.
+    frequency
+        Evenly spaced frequencies (frequency,), Hz.
+    """
+
+    lower: aperture.Aperture
+    upper: aperture.Aperture
+    positions: int
+    frequency: Floats
+
+    @classmethod
+    def of(cls, antennas: xr.Dataset, frequency: Floats) -> Instrument:
+        """Return the instrument of some antenna positions.
+
+        Parameters
+        ----------
+        antennas
+            Product ``trajectory``, or ``images``.
+        frequency
+            Frequencies, Hz.
+        """
+        lower, upper = trajectory.apertures(antennas)
+        return cls(lower, upper, antennas["receiver"].sizes["position"], frequency)
+
+    @classmethod
+    def planned(cls, radar: config.Radar) -> Instrument:
+        """Return the instrument of a configuration's section ``radar``, without any errors."""
+        frequency = waveform.frequencies(
+            radar.start_frequency_hz, radar.stop_frequency_hz, radar.frequency_count
+        )
+        return cls.of(trajectory.planned(radar), frequency)
+
+    @property
+    def wavelength(self) -> float:
+        """Wavelength of the carrier, m."""
+        return waveform.wavelength(waveform.carrier(self.frequency))
+
+    @property
+    def shortest_wavelength(self) -> float:
+        """Wavelength at the upper end of the band, m."""
+        return waveform.wavelength(float(self.frequency[-1]))
+
+    @property
+    def frequency_step(self) -> float:
+        """Step of the frequencies, Hz."""
+        return float(self.frequency[1] - self.frequency[0])
+
+    @property
+    def range_resolution(self) -> float:
+        """Slant-range resolution ``c / 2W``, m."""
+        return waveform.range_resolution(float(self.frequency[-1] - self.frequency[0]))
+
+    @property
+    def unambiguous_range(self) -> float:
+        """Slant range after which the waveform repeats, m."""
+        return waveform.unambiguous_range(self.frequency_step)
+
+    @property
+    def separated(self) -> tuple[Floats, Floats]:
+        """Places (3,) of the lower and the upper of the antennas that the baseline separates, m."""
+        ends = (
+            (self.lower.receiver, self.upper.receiver),
+            (self.lower.transmitter, self.upper.transmitter),
+        )
+        return max(ends, key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))
+
+    @property
+    def baseline(self) -> float:
+        """Distance of the antennas that the baseline separates, m."""
+        lower, upper = self.separated
+        return float(np.linalg.norm(upper - lower))
+
+    @property
+    def lowest(self) -> float:
+        """Height of the lowest antenna, m."""
+        return min(
+            float(end[2])
+            for part in (self.lower, self.upper)
+            for end in (part.transmitter, part.receiver)
+        )
+
+    def slant_range(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return half the lower aperture's path to points of the ground plane, m."""
+        return aperture.path(self.lower, x, y) / 2
+
+    def look_angle(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the look angle from nadir at the lower aperture's centre, rad."""
+        return geometry.look_angle(self.lower.center, x, y)
+
+    def resolution(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the resolution on the ground plane in x and y.
+
+        In y the path's cell ``c / W`` over the path's derivative by y; in x the wavelength over
+        the derivative by x of the path's change along the aperture. On a rail that is
+        ``lambda r / 2L`` over the squared cosine of the squint, by which the aperture shortens and
+        the angle turns; with one end that stands still, twice as much.
+
+        Parameters
+        ----------
+        x, y
+            Points, m, of shapes that broadcast.
+
+        Returns
+        -------
+        ndarray, shape (2, ...)
+            Resolution in x and y, m.
+        """
+        return waveform.ground_resolution(self.lower, x, y, frequency=self.frequency)
+
+    def looks(self, side_m: float, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the independent looks of a square window: its area in resolution cells.
+
+        Parameters
+        ----------
+        side_m
+            Side of the window, m.
+        x, y
+            Points, m, of shapes that broadcast.
+
+        Returns
+        -------
+        ndarray
+            Looks, at least 1: pixels finer than the resolution are not independent.
+        """
+        across, ahead = self.resolution(x, y)
+        return np.maximum(1.0, side_m**2 / (across * ahead))
+
+    def height_per_difference(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the height's derivative by the difference of the paths, lower less upper, m/m.
+
+        A target moves with its height along ``t = grad path_1 x grad slope_1``, which keeps it in
+        its pixel; the difference changes by ``-(t . grad path_2) / t_z`` for each metre.
+        """
+        length, slope = aperture.gradients(self.lower, x, y)
+        other, _ = aperture.gradients(self.upper, x, y)
+        along = np.cross(length, slope, axis=0)
+        return np.asarray(-along[2] / (along * other).sum(axis=0))
+
+    def height_of_ambiguity(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the height that turns the phase of a pixel by a cycle, m, without its sign.
+
+        On a rail with a vertical baseline that is ``lambda r2 / 2B``; with one end of the path
+        common to both channels, twice as much.
+        """
+        return np.abs(self.wavelength * self.height_per_difference(x, y))
+
+    def random_phase_std(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the standard deviation of the height under a phase that is noise, m.
+
+        A phase uniform over a cycle makes heights uniform over the height of ambiguity.
+        """
+        return self.height_of_ambiguity(x, y) / np.sqrt(12)
+
+    def geometric_coherence(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the coherence that the baseline leaves level ground.
+
+        Each channel sees the ground's wavenumbers along y in a band of its own, the frequencies
+        times ``|dpath / dy| / c``. What the bands share is common to the images. For a plane wave
+        that is ``1 - B_perp / B_crit``.
+        """
+        return self._shared_band(np.asarray(1.0), x, y)
+
+    def critical_baseline(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the baseline of the same attitude that decorrelates level ground, m.
+
+        The shortest with which the channels see no wavenumber of the ground in common
+        (`geometric_coherence`); infinite if there is none. The formula for a plane wave
+        (`formulas.critical_baseline`) is the limit of a waveform of narrow band, whose critical
+        baseline is short against the range and the antennas' height.
+
+        Parameters
+        ----------
+        x, y
+            Points, m, of shapes that broadcast.
+
+        Returns
+        -------
+        ndarray
+            Length, m.
+        """
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        factors = _FACTORS.reshape(-1, *(1,) * x.ndim)
+        gone = self._shared_band(factors, x, y) == 0
+        first = np.argmax(gone, axis=0)
+        low, high = _FACTORS[np.maximum(first - 1, 0)], _FACTORS[first]
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            lost = self._shared_band(middle, x, y) == 0
+            low, high = np.where(lost, low, middle), np.where(lost, middle, high)
+        return np.where(gone.any(axis=0), self.baseline * high, np.inf)
+
+    def _shared_band(self, factor: Floats, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return the coherence of level ground with so many times the baseline."""
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        slopes: list[Floats] = []
+        for times in (np.zeros_like(factor), factor):
+            slope: Floats = np.zeros(())
+            for mine, other in (
+                (self.lower.transmitter, self.upper.transmitter),
+                (self.lower.receiver, self.upper.receiver),
+            ):
+                # Nothing to move where a channel shares its antenna: shapes broadcast.
+                end = [a + times * (b - a) for a, b in zip(mine, other, strict=True)]
+                ahead = y - end[1]
+                slope = slope + ahead / np.sqrt((x - end[0]) ** 2 + ahead**2 + end[2] ** 2)
+            slopes.append(np.abs(slope))
+        low, high = self.frequency[0], self.frequency[-1]
+        least, most = np.minimum(*slopes), np.maximum(*slopes)
+        shared = high * least - low * most
+        return np.clip(shared / ((high - low) * np.sqrt(least * most)), 0, 1)
+
+    def growth(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Return by how much the lower path grows from one position to the next, in the mean, m.
+
+        Targets look alike when the growth of their paths differs by a wavelength (grating lobes).
+        """
+        part = self.lower
+        first, last = (
+            geometry.slant_range(part.transmitter + end * part.transmitter_travel, x, y)
+            + geometry.slant_range(part.receiver + end * part.receiver_travel, x, y)
+            for end in (-0.5, 0.5)
+        )
+        return np.asarray(last - first) / max(self.positions - 1, 1)
+
+    def filled(self, x_min_m: float, x_max_m: float, y: ArrayLike) -> Floats:
+        """Return the share of the unambiguous width that ground from x_min to x_max fills.
+
+        At the carrier; above 1 it folds over itself.
+        """
+        return np.abs(self.growth(x_max_m, y) - self.growth(x_min_m, y)) / self.wavelength
+
+    def widest_spacing(self, x: ArrayLike, y: ArrayLike) -> float:
+        """Return the widest mean spacing of the positions that images all of some points once, m.
+
+        Parameters
+        ----------
+        x, y
+            Points, m, of shapes that broadcast.
+
+        Returns
+        -------
+        float
+            Spacing along the aperture at which the growth of the paths to two of them differs by
+            the shortest wavelength; infinite for points that all look alike.
+        """
+        travel = max(
+            float(np.linalg.norm(part))
+            for part in (self.lower.transmitter_travel, self.lower.receiver_travel)
+        )
+        spacing = travel / max(self.positions - 1, 1)
+        spread = float(np.ptp(self.growth(x, y)))
+        return spacing * self.shortest_wavelength / spread if spread > 0 else math.inf
+
+    def unambiguous_width(self, x: float, y: float) -> float:
+        """Return the width around x that the spacing of the positions images once, m.
+
+        By the shortest wavelength; infinite if no two targets look alike.
+        """
+        from scipy.optimize import brentq
+
+        def excess(width: float) -> float:
+            left, right = self.growth(x + width * np.array([-0.5, 0.5]), y)
+            return float(abs(right - left)) - self.shortest_wavelength
+
+        widest = 1e4
+        return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
+
+
+def middle(area: config.Scene | config.Imaging) -> tuple[float, float]:
+    """Return the middle of a part of the ground, x and y in m."""
+    return (area.x_min_m + area.x_max_m) / 2, (area.y_min_m + area.y_max_m) / 2
