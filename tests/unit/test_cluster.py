@@ -1,4 +1,5 @@
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import xarray as xr
 
 from vinsar.study import config, validation
 from vinsar.sweeps import cluster, sweep
+from vinsar.sweeps import processes as processes_module
 
 ROOT = Path(__file__).parents[2]
 OVER = {"motion.level_wavelengths": [0.0, 0.1, 0.2], "filtering.goldstein_alpha": [0.3, 0.8]}
@@ -108,15 +110,41 @@ def test_two_processes_give_the_same_bits(study, alone, processes):
     xr.testing.assert_identical(run(study, processes), alone)
 
 
-def test_what_is_started_listens_on_the_loopback_alone(processes):
-    assert processes
-    listening = {
-        (socket.laddr.ip)
-        for one in [psutil.Process(), *descendants()]
-        for socket in one.net_connections(kind="inet")
-        if socket.status == psutil.CONN_LISTEN or not socket.raddr
-    }
-    assert listening == {"127.0.0.1"}
+def test_nobody_can_speak_to_the_workers(processes):
+    assert len(processes.workers) == 2
+    ours = [psutil.Process(), *worker_processes()]
+    assert len(ours) == 3
+    # A pair of sockets joins each worker to this process; it has no name to connect to.
+    pairs = [socket for one in ours for socket in one.net_connections(kind="all")]
+    assert pairs
+    assert not [socket for socket in pairs if socket.laddr or socket.status == psutil.CONN_LISTEN]
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
+def test_another_user_cannot_open_the_workers_pipes(processes):
+    ends = [path for one in worker_processes() for path in Path(f"/proc/{one.pid}/fd").iterdir()]
+    assert len(ends) >= 2 * len(processes.workers)
+    assert opened_by(0, ends) == len(ends)
+    assert opened_by(65534, ends) == 0
+
+
+def opened_by(uid, paths):
+    """Count the paths that a user can open, in a process that becomes this user."""
+    child = os.fork()
+    if child == 0:
+        os.setgroups([])
+        os.setgid(uid)
+        os.setuid(uid)
+        count = 0
+        for path in paths:
+            try:
+                # O_PATH suffices to hold a file, and a pair of sockets can be opened no other way.
+                os.open(path, os.O_PATH)
+                count += 1
+            except OSError:
+                pass
+        os._exit(count)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 def test_a_killed_worker_costs_nothing_but_time(study, alone, processes):
@@ -132,8 +160,25 @@ def test_a_killed_worker_costs_nothing_but_time(study, alone, processes):
     assert not victims
 
 
-def test_a_scheduler_elsewhere_gives_the_same_bits(study, alone, processes):
-    address = processes.args[0].scheduler.address
+@pytest.fixture(scope="module")
+def elsewhere():
+    """Return the address of a cluster of two processes that somebody else has started."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=None,
+        worker_dashboard_address=None,
+        scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+        silence_logs=logging.ERROR,
+    ) as made:
+        yield made
+
+
+def test_a_scheduler_elsewhere_gives_the_same_bits(study, alone, elsewhere):
+    address = elsewhere.scheduler_address
     with cluster.workers(options(address=address), 1) as compute:
         xr.testing.assert_identical(run(study, compute), alone)
     with (
@@ -142,7 +187,27 @@ def test_a_scheduler_elsewhere_gives_the_same_bits(study, alone, processes):
     ):
         xr.testing.assert_identical(run(study, compute), alone)
     # It is left as it was.
-    assert len(processes.args[0].scheduler_info(n_workers=-1)["workers"]) == 2
+    assert len(elsewhere.scheduler_info["workers"]) == 2
+
+
+def test_a_cluster_without_the_encryption_that_dask_is_to_require_is_a_sentence(elsewhere):
+    address = elsewhere.scheduler_address
+    with (
+        dask.config.set({"distributed.comm.require-encryption": True}),
+        pytest.raises(ConnectionError, match=f"{address} .*encryption required"),
+        cluster.workers(options(address=address), 1),
+    ):
+        pass
+
+
+def test_required_encryption_is_no_matter_of_processes_of_this_machine():
+    with (
+        dask.config.set({"distributed.comm.require-encryption": True}),
+        cluster.workers(options("processes"), 1) as compute,
+    ):
+        results = []
+        compute(squares, [[3]], results.append, nothing)
+    assert results == [[9]]
 
 
 def die_at_three(numbers):
@@ -151,21 +216,62 @@ def die_at_three(numbers):
     return squares(numbers)
 
 
-def test_a_case_that_kills_its_worker_is_told_apart_from_its_neighbours(processes):
+def kills_a_case(compute, blocks):
+    """Run blocks, a case of which kills its worker; return the results and what is lost."""
     results, lost = [], []
+    compute(die_at_three, blocks, results.append, lambda *told: lost.append(told))
+    return sorted(number for block in results for number in block), lost
 
-    def blame_at_once(dask_scheduler):
-        dask_scheduler.allowed_failures = 0
 
-    processes.args[0].run_on_scheduler(blame_at_once)
-    processes(
-        die_at_three,
-        [[1], [2, 3, 4], [5, 6]],
-        results.append,
-        lambda block, reason: lost.append((block, reason)),
-    )
-    assert sorted(number for block in results for number in block) == [1, 4, 16, 25, 36]
+def test_a_case_that_kills_its_worker_is_told_apart_from_its_neighbours(processes):
+    found, lost = kills_a_case(processes, [[1], [2, 3, 4], [5, 6]])
+    assert found == [1, 4, 16, 25, 36]
     assert lost == [([3], "its worker died each time that it was tried")]
+
+
+def test_a_case_that_kills_the_workers_of_a_cluster_is_told_apart_as_well(elsewhere):
+    elsewhere.scheduler.allowed_failures = 0
+    with cluster.workers(options(address=elsewhere.scheduler_address), 1) as compute:
+        found, lost = kills_a_case(compute, [[1], [2, 3, 4], [5, 6]])
+    assert found == [1, 4, 16, 25, 36]
+    assert lost == [([3], "its worker died each time that it was tried")]
+
+
+def give_up(_):
+    raise OSError("the disk is full")
+
+
+def test_what_is_given_up_does_not_answer_later(processes):
+    with pytest.raises(OSError, match="the disk is full"):
+        processes(squares, [[1], [2], [3], [4]], give_up, nothing)
+    results = []
+    processes(squares, [[5]], results.append, nothing)
+    assert results == [[25]]
+
+
+def test_workers_go_with_the_process_that_started_them(tmp_path):
+    program = f"""
+import os, signal, time
+from vinsar.sweeps import processes
+if __name__ == "__main__":
+    pool = processes.Pool(2)
+    pids = [str(worker.process.pid) for worker in pool.workers]
+    open({str(tmp_path / "pids")!r}, "w").write(" ".join(pids))
+    # In the middle of work, too.
+    for worker in pool.workers:
+        worker.begin(time.sleep, 600)
+    time.sleep(0.5)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    (tmp_path / "program.py").write_text(program)
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    done = subprocess.run([sys.executable, tmp_path / "program.py"], env=environment, check=False)
+    assert done.returncode == -signal.SIGKILL
+    pids = [int(pid) for pid in (tmp_path / "pids").read_text().split()]
+    until = time.monotonic() + 30
+    while any(map(psutil.pid_exists, pids)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(map(psutil.pid_exists, pids))
 
 
 def raise_at_three(numbers):
@@ -245,7 +351,7 @@ def test_a_scheduler_that_goes_away_is_said(tmp_path, monkeypatch):
 
 
 def test_each_worker_has_neighbouring_blocks():
-    runs = cluster._Runs(list(range(10)))
+    runs = processes_module.Runs(list(range(10)))
     first = [runs.take("a") for _ in range(2)]
     second = [runs.take("b") for _ in range(4)]
     assert first == [0, 1]

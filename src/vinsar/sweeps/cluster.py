@@ -8,31 +8,19 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from vinsar.foundations import blocks
+from vinsar.sweeps import processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from vinsar.study import config
+    from vinsar.sweeps.processes import Function, Lost, Receive
 
-    Function = Callable[[Any], Any]
-    Receive = Callable[[Any], None]
-    Lost = Callable[[Any, str], None]
     Compute = Callable[[Function, list[Any], Receive, Lost], None]
 
 logger = logging.getLogger(__name__)
 
 _PATIENCE_S = 5
-
-# What worker processes do beside their work, by default, takes a fifth of their time.
-_LEAN = {
-    # Looking at the working thread, and at the clock, many times a second.
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "1s",
-    # Giving each freed array back to the system; one thread a library remains of this setting.
-    "distributed.nanny.pre-spawn-environ": {
-        f"{library}_NUM_THREADS": 1 for library in ("OMP", "MKL", "OPENBLAS")
-    },
-}
 
 # What a thread of a worker is given at a time: one to run, one to begin with next.
 _AT_A_TIME = 2
@@ -75,8 +63,8 @@ def workers(options: config.Dask, count: int) -> Iterator[Compute]:
     elif options.scheduler == "threads":
         yield partial(_on_threads, count)
     else:
-        with _processes(count) as client:
-            yield partial(_on_cluster, client)
+        with processes.pool(count) as pool:
+            yield pool
 
 
 def _connect(address: str) -> Any:
@@ -100,41 +88,6 @@ def _connect(address: str) -> Any:
         ) from error
 
 
-@contextmanager
-def _processes(count: int) -> Iterator[Any]:
-    import signal
-
-    import dask
-    from distributed import Client, LocalCluster, WorkerPlugin
-
-    class LeaveInterrupts(WorkerPlugin):  # type: ignore[misc]
-        """Ctrl-C reaches workers too, but it is this process that ends them."""
-
-        def setup(self, worker: Any) -> None:
-            del worker
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    with (
-        dask.config.set(_LEAN),
-        LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            # Nothing that we start is seen from another machine.
-            host="127.0.0.1",
-            dashboard_address=None,
-            worker_dashboard_address=None,
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-            # The products that a stage keeps bound the memory.
-            memory_limit=0,
-            silence_logs=logging.ERROR,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        client.register_plugin(LeaveInterrupts())
-        yield client
-
-
 def _on_threads(
     count: int, function: Function, blocks_: list[Any], receive: Receive, lost: Lost
 ) -> None:
@@ -150,32 +103,13 @@ def _on_threads(
         blocks.run(function, ((block,) for block in blocks_))
 
 
-class _Runs:
-    """Neighbouring blocks for each worker: they share what their cases have in common."""
-
-    def __init__(self, blocks_: list[Any]) -> None:
-        # Each backwards, so that its next block is its last item.
-        self._runs: dict[str, list[Any]] = {"": blocks_[::-1]}
-
-    def take(self, worker: str) -> Any | None:
-        """Return a worker's next block; one that has none left takes half of the longest run."""
-        if "" in self._runs:
-            self._runs[worker] = self._runs.pop("")
-        elif not self._runs.get(worker):
-            longest = max(self._runs.values(), key=len)
-            half = (len(longest) + 1) // 2
-            self._runs[worker], longest[:half] = longest[:half], []
-        own = self._runs[worker]
-        return own.pop() if own else None
-
-
 def _on_cluster(
     client: Any, function: Function, blocks_: list[Any], receive: Receive, lost: Lost
 ) -> None:
     from distributed import KilledWorker, as_completed
     from distributed.client import FutureCancelledError
 
-    runs = _Runs(blocks_)
+    runs = processes.Runs(blocks_)
     running: dict[Any, tuple[str, Any]] = {}
     completed = as_completed()
     suspects = []
