@@ -272,7 +272,9 @@ def test_on_a_terminal_a_bar_is_drawn(progress, monkeypatch):
             tell(50, 100)
         terminal.flush()
         monkeypatch.undo()
-        shown = screen.read(4096).decode()
+        shown = ""
+        while not shown.endswith("\r\n"):
+            shown += screen.read(4096).decode()
     half = "#" * 15 + "." * 15
     assert f"[{half}] vibration: 50 of 100 cases, 12.5 cases/s, 4 s left" in shown
     assert shown.startswith("\r[" + "." * 30 + "] vibration: 0 of 100 cases\x1b[K\r")
