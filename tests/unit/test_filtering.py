@@ -171,3 +171,30 @@ def test_apply_takes_the_filter_by_name(method):
     }[method]()
     np.testing.assert_array_equal(found["interferogram"].values, expected)
     np.testing.assert_array_equal(data["interferogram"].values, values)
+
+
+@pytest.mark.parametrize("std", [0.7, 2.0])
+def test_the_gaussian_is_the_mean_by_its_weights(std):
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=(20, 31)) + 1j * rng.normal(size=(20, 31))
+    found = filtering.gaussian(values, std_px=std)
+    row, column = np.indices(values.shape)
+    for at in ((10, 15), (0, 0), (19, 4)):
+        reach = int(4 * std + 0.5)
+        weight = np.exp(-((row - at[0]) ** 2 + (column - at[1]) ** 2) / (2 * std**2))
+        weight[(abs(row - at[0]) > reach) | (abs(column - at[1]) > reach)] = 0
+        expected = (weight * values).sum() / weight.sum()
+        assert found[at] == pytest.approx(expected, abs=2e-6)
+
+
+def test_the_gaussian_averages_as_many_looks_as_its_docstring_says():
+    rng = np.random.default_rng(5)
+    noise = rng.normal(size=(400, 400)) + 1j * rng.normal(size=(400, 400))
+    power = np.mean(abs(filtering.gaussian(noise, std_px=2.0)[20:-20, 20:-20]) ** 2)
+    # 160,000 pixels in correlated groups of 50: power within 2 % by one standard deviation.
+    assert 2 / power == pytest.approx(4 * np.pi * 2.0**2, rel=0.08)
+
+
+def test_a_gaussian_without_width_is_refused():
+    with pytest.raises(ValueError, match="wider than 0"):
+        filtering.gaussian(np.ones((3, 3), complex), std_px=0.0)

@@ -125,6 +125,45 @@ def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]
     return np.asarray(sums / np.outer(*covered), np.complex64)
 
 
+def gaussian(interferogram: Complexes, *, std_px: float) -> NDArray[np.complex64]:
+    """Average with a Gaussian weight.
+
+    Parameters
+    ----------
+    interferogram
+        Complex interferogram (y, x).
+    std_px
+        Standard deviation of the weight, pixels; it averages as many pixels as a window of
+        ``4 pi std_px^2`` of equal weights.
+
+    Returns
+    -------
+    ndarray, shape (y, x), complex64
+        Filtered interferogram; at the edges, over what there is.
+
+    Raises
+    ------
+    ValueError
+        If the standard deviation is not positive.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    if not std_px > 0:
+        raise ValueError(f"a Gaussian of {std_px} pixels must be wider than 0")
+    values = np.asarray(interferogram, np.complex64)
+    for axis, size in enumerate(values.shape):
+        covered = gaussian_filter1d(np.ones(size), std_px, mode="constant")
+        parts = (
+            gaussian_filter1d(part, std_px, axis=axis, mode="constant")
+            for part in (values.real, values.imag)
+        )
+        shape = [1, 1]
+        shape[axis] = size
+        real, imag = (part / covered.reshape(shape) for part in parts)
+        values = np.asarray(real + 1j * imag, np.complex64)
+    return values
+
+
 def apply(
     interferogram: xr.Dataset,
     *,
