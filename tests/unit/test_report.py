@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 import yaml
 
 from vinsar import figures, report
-from vinsar.figures import style
+from vinsar.figures.drawing import style
 from vinsar.foundations import variables
 from vinsar.report import content
 from vinsar.results import lineage
@@ -61,7 +62,6 @@ def sources(study: config.Study | None = None, **parts: Any) -> report.Sources:
         "paper": PAPER,
         "products": {},
         "figures": (),
-        "captions": {},
         "records": {},
     }
     return report.Sources(**given | parts)
@@ -217,13 +217,26 @@ def test_accuracy_claims_and_provenance_say_what_they_were_given(accuracy: Any) 
     assert code.text.splitlines()[0] == "git checkout 0123456789ab"
 
 
-def test_pictures_keep_their_width_and_panels_of_a_sheet_are_left_out(
-    drawn: tuple[Path, ...], tmp_path: Path
+def test_a_stage_without_a_small_picture_is_named(
+    accuracy: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    for thumbnails in ({}, {"accuracy": figures.Thumbnail("height error")}):
+        monkeypatch.setattr(content, "THUMBNAILS", thumbnails)
+        found = report.build(sources(products={"accuracy": accuracy}))
+        (step,) = section(found, "chain").blocks[1].steps  # type: ignore[union-attr]
+        assert step.png is None
+        assert step.shows == ("height error" if thumbnails else "accuracy")
+
+
+def test_pictures_keep_their_width_and_panels_of_a_sheet_are_left_out(
+    drawn: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = replace(figures.FIGURES["fig1"], caption="The\n``geometry``.\n")
+    monkeypatch.setitem(figures.FIGURES, "fig1", shown)
     for name in ("fig3", "fig3a"):
         (tmp_path / f"{name}.png").write_bytes(drawn[1].read_bytes())
     given = (*drawn, tmp_path / "fig3.png", tmp_path / "fig3a.png")
-    found = report.build(sources(figures=given, captions={"fig1": "The\n``geometry``.\n"}))
+    found = report.build(sources(figures=given))
     pictures = [b for b in section(found, "figures").blocks if isinstance(b, content.Picture)]
     assert [(p.name, p.share, p.pdf is None) for p in pictures] == [
         ("fig1", 1.0, False),
@@ -233,18 +246,20 @@ def test_pictures_keep_their_width_and_panels_of_a_sheet_are_left_out(
     assert pictures[0].label == "Figure 1. Geometry."
     assert pictures[0].caption.startswith("The `geometry`. Drawn for a target 13 m ahead")
     # Its sweep is not there, so it has no numbers, and it is shown all the same.
-    assert pictures[1].caption == ""
+    assert pictures[1].caption == figures.FIGURES["snr"].caption
 
 
 def test_both_renderings_escape_hold_their_provenance_and_are_the_same_twice(
-    accuracy: Any, drawn: tuple[Path, ...], tmp_path: Path
+    accuracy: Any, drawn: tuple[Path, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    caption = "Code in `a_long.name`, #hash $x$ *star* _under_ <b>."
+    shown = replace(figures.FIGURES["fig1"], caption=caption)
+    monkeypatch.setitem(figures.FIGURES, "fig1", shown)
     found = report.build(
         sources(
             products={"accuracy": accuracy},
             claims=(CLAIM,),
             figures=drawn,
-            captions={"fig1": "Code in `a_long.name`, #hash $x$ *star* _under_ <b>."},
             records={"dem.nc": RECORD},
         )
     )

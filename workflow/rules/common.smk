@@ -7,6 +7,7 @@ from snakemake.logging import logger
 
 from vinsar import figures
 from vinsar import report as study_report
+from vinsar.evaluation import detection_accuracy
 from vinsar.paper import claims
 from vinsar.prediction import systems
 from vinsar.results import provenance
@@ -23,11 +24,6 @@ try:
         ingest.read(STUDY)
 except validation.ConfigurationError as error:
     raise WorkflowError(str(error)) from None
-
-PANELS = [
-    name for name in STUDY.outputs.figures if name.startswith("fig3") and name != "fig3"
-]
-SINGLE = [name for name in STUDY.outputs.figures if name not in PANELS]
 
 for sentence in validation.advice(STUDY):
     logger.warning(f"Configuration: {sentence}")
@@ -84,9 +80,14 @@ def sweep_files(*names):
     return {f"sweeps/{name}": f"<results>/sweeps/{name}.nc" for name in names}
 
 
-def drawn_as(figure):
-    """The figures that the rule of this name draws."""
-    return PANELS if figure == "fig3_panels" else [figure]
+def figure_jobs():
+    """The figures to draw, by job: the panels of a sheet are drawn together."""
+    jobs = {}
+    # The design sheet can be asked for in any study.
+    for name in dict.fromkeys([*STUDY.outputs.figures, "design"]):
+        sheet = figures.FIGURES[name].sheet
+        jobs.setdefault(f"{sheet}_panels" if sheet else name, []).append(name)
+    return jobs
 
 
 def figure_inputs(*names):
@@ -101,11 +102,19 @@ def figure_configuration(*names):
     )
 
 
-def figure_files(*names, caption):
+def figure_sources(*names):
+    """The modules that declare figures, and what writes them to files."""
+    modules = {figures.MODULES[name] for name in names}
+    return sources_of(*sorted(modules), "figures.drawing.files", script="figures")
+
+
+def figure_files(*names):
     """The files of figures; the report shows the PNG."""
     files = []
     for name in names:
-        shown = dict(caption=caption, category="Figures", labels={"figure": name})
+        shown = dict(
+            caption="../report/caption.rst", category="Figures", labels={"figure": name}
+        )
         for suffix in STUDY.figures.formats:
             path = f"<results>/figures/{name}.{suffix}"
             files += [report(path, **shown) if suffix == "png" else path]

@@ -39,12 +39,12 @@ rule detection_accuracy:
 
 rule detection_summary:
     input:
-        **sweep_files("roughness"),
+        **sweep_files(detection_accuracy.SWEEP),
         code=sources_of("evaluation.detection_accuracy", script="detection_summary"),
     output:
         report(
             "<results>/detection.md",
-            caption="../report/detection.rst",
+            caption="../report/caption.rst",
             category="Numbers",
         ),
     log:
@@ -53,5 +53,7 @@ rule detection_summary:
         "<benchmarks>/detection_summary.tsv"
     params:
         configuration=configuration("scene", "detection", "sweeps"),
+        caption="How many obstacles and holes are found, false alarms of the heights and of the "
+        "image alone, and what is unknown.",
     script:
         "../scripts/detection_summary.py"

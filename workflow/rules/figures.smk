@@ -1,21 +1,21 @@
-# The figures, each as PDF, SVG and PNG; the panels of the third are drawn together. That of the design
-# sheet can be asked for in any study.
+# The figures, each as PDF, SVG and PNG.
 
-for FIGURE in dict.fromkeys([*SINGLE, *(["fig3_panels"] if PANELS else []), "design"]):
+for JOB, NAMES in figure_jobs().items():
 
     rule:
         name:
-            f"figure_{FIGURE}"
+            f"figure_{JOB}"
         input:
-            **figure_inputs(*drawn_as(FIGURE)),
-            code=sources_of("figures", script="figures"),
+            **figure_inputs(*NAMES),
+            code=figure_sources(*NAMES),
         output:
-            figure_files(*drawn_as(FIGURE), caption=f"../report/{FIGURE}.rst"),
+            figure_files(*NAMES),
         log:
-            f"<logs>/figure_{FIGURE}.log",
+            f"<logs>/figure_{JOB}.log",
         benchmark:
-            f"<benchmarks>/figure_{FIGURE}.tsv"
+            f"<benchmarks>/figure_{JOB}.tsv"
         params:
-            configuration=figure_configuration(*drawn_as(FIGURE)),
+            configuration=figure_configuration(*NAMES),
+            caption=figures.FIGURES[NAMES[0]].caption,
         script:
             "../scripts/figures.py"

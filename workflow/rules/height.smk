@@ -57,7 +57,7 @@ rule accuracy_summary:
     output:
         report(
             "<results>/accuracy.json",
-            caption="../report/accuracy.rst",
+            caption="../report/caption.rst",
             category="Numbers",
         ),
     log:
@@ -66,5 +66,7 @@ rule accuracy_summary:
         "<benchmarks>/accuracy_summary.tsv"
     params:
         configuration=configuration(),
+        caption="Statistics of the height error in metres, for the whole scene, visible ground and "
+        "shadow.",
     script:
         "../scripts/accuracy_summary.py"

@@ -9,7 +9,7 @@ rule claims:
     output:
         json=report(
             "<results>/claims.json",
-            caption="../report/claims.rst",
+            caption="../report/caption.rst",
             category="Claims",
         ),
         markdown="<results>/claims.md",
@@ -19,6 +19,7 @@ rule claims:
         "<benchmarks>/claims.tsv"
     params:
         configuration=configuration(*claims.SECTIONS),
+        caption="The paper's claims, what this study finds, and the verdict on each.",
     script:
         "../scripts/claims.py"
 
@@ -30,7 +31,7 @@ rule variants:
     output:
         report(
             "<results>/variants.md",
-            caption="../report/variants.rst",
+            caption="../report/caption.rst",
             category="Numbers",
         ),
     log:
@@ -40,6 +41,8 @@ rule variants:
     threads: workflow.cores
     params:
         configuration=STUDY.model_dump(mode="json"),
+        caption="Accuracy of the study beside variants of it: other seeds, rail heights and choices "
+        "that the paper leaves open.",
     script:
         "../scripts/variants.py"
 
@@ -61,9 +64,8 @@ rule report:
             else {}
         ),
         code=[
-            *sources_of("report", script="report"),
+            *sources_of("report", *figures.MODULES.values(), script="report"),
             *[os.path.relpath(path) for path in study_report.TEMPLATES],
-            *[f"workflow/report/{name}.rst" for name in SINGLE],
             "config/paper.yaml",
             "docs/errata.md",
         ],
@@ -102,7 +104,7 @@ rule systems:
     output:
         report(
             "<results>/systems.md",
-            caption="../report/systems.rst",
+            caption="../report/caption.rst",
             category="Numbers",
         ),
     log:
@@ -111,5 +113,6 @@ rule systems:
         "<benchmarks>/systems.tsv"
     params:
         configuration=configuration("radar", "scene", "vehicle", "sweeps"),
+        caption=figures.FIGURES["systems"].caption,
     script:
         "../scripts/systems.py"

@@ -21,17 +21,12 @@ def sources():
     }
     figures = [path for path in paths.values() if path.parent.name == "figures"]
     claims = paths.get("claims.json")
-    texts = {Path(path).name: Path(path) for path in snakemake.input.code}  # captions among them
+    texts = {Path(path).name: Path(path) for path in snakemake.input.code}
     return report.Sources(
         study=config.Study.part(snakemake.params.configuration),
         paper=yaml.safe_load(texts["paper.yaml"].read_text(encoding="utf-8")),
         products=products,
         figures=tuple(figures),
-        captions={
-            path.stem: path.read_text(encoding="utf-8")
-            for name, path in texts.items()
-            if name.endswith(".rst")
-        },
         records=lineage.read_records(Path(snakemake.output.html).parent),
         claims=tuple(json.loads(claims.read_text(encoding="utf-8"))) if claims else (),
         errata=texts["errata.md"].read_text(encoding="utf-8"),

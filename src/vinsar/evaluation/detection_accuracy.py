@@ -31,6 +31,9 @@ AMPLITUDE_THRESHOLDS = 10 ** (np.arange(0.5, 15.01, 0.5) / 10)
 WANTED = 0.9
 """Probability of detection at which false alarms are compared."""
 
+SWEEP = "roughness"
+"""The sweep over the roughness of the ground in which the tables and the figure look."""
+
 # Heights closer than this are the same.
 _SLACK_M = 1e-9
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar.figures import style
+from vinsar.figures.drawing import declaration, style, thumbnails
 from vinsar.radar import formulas, geometry, instrument
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
@@ -501,3 +502,53 @@ def _area(area: config.Scene | config.Imaging, **look: Any) -> Rectangle:
         area.y_max_m - area.y_min_m,
         **look,
     )
+
+
+def numbers(products: Products, study: config.Study) -> str:
+    """Return the ranges and angles that Fig. 1 draws, as a sentence."""
+    del products
+    scheme = layout(study)
+    r1, r2 = scheme.ranges
+    return (
+        f"Drawn for a target {scheme.target[0]:g} m ahead and {scheme.target[1]:g} m high: "
+        f"r1 = {r1:.3f} m, r2 = {r2:.3f} m, θ = {np.degrees(scheme.look):.2f}°."
+    )
+
+
+def _positions(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    for channel, colour in enumerate((style.BLUE, style.ORANGE)):
+        for name, marker in (("receiver", "."), ("transmitter", "+")):
+            x, _, z = product[name].values[channel].T
+            axes.plot(x, z, marker, color=colour, markersize=2.5, markeredgewidth=0.4)
+    axes.margins(0.1, 0.6)
+
+
+def _visible(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    axes.imshow(
+        product["visible"].values[0], cmap="gray", aspect="auto", interpolation="antialiased"
+    )
+
+
+FIGURES = {
+    "fig1": declaration.Figure(
+        draw=draw,
+        title="Geometry",
+        caption=(
+            "The geometry, drawn to scale from the configuration, with height of ambiguity and "
+            "resolution on the ground below the target: the antennas above the ground plane "
+            "(S1 and S2 on a rail, Tx and Rx of an array), baseline, look angle and slant "
+            "ranges to a target in the scene."
+        ),
+        sections=("figures", "radar", "scene", "imaging"),
+        numbers=numbers,
+    ),
+}
+
+THUMBNAILS = {
+    "trajectory": thumbnails.Thumbnail("antenna positions, x and z", _positions),
+    "true_trajectory": thumbnails.Thumbnail("where the antennas really were", _positions),
+    "recorded_trajectory": thumbnails.Thumbnail("where imaging is told they were", _positions),
+    "visibility": thumbnails.Thumbnail("facets seen from each position, lower antenna", _visible),
+}

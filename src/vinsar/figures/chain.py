@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar.figures import maps, style
+from vinsar.figures.drawing import declaration, maps, style, thumbnails
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
     from matplotlib.axes import Axes
-    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
     from vinsar.study import config
@@ -31,24 +30,12 @@ _FAILED_PERCENT = 0.1
 
 
 @dataclass(frozen=True)
-class Layer:
-    """What a map shows: values, colours, and the colour bar that explains them."""
-
-    data: xr.DataArray
-    colormap: Colormap
-    limits: tuple[float, float]
-    label: str
-    extend: maps.Extend = "neither"
-    phase: bool = False
-
-
-@dataclass(frozen=True)
 class Panel:
     """A panel of Fig. 3: its title, the product it shows, and how."""
 
     title: str
     product: str
-    layer: Callable[[Products, config.Study], Layer]
+    layer: Callable[[Products, config.Study], maps.Layer]
 
 
 def height_limits(heights: xr.Dataset, outside_percent: float = 0.0) -> tuple[float, float]:
@@ -76,12 +63,12 @@ def height_limits(heights: xr.Dataset, outside_percent: float = 0.0) -> tuple[fl
     return float(low), float(high)
 
 
-def _height(data: xr.DataArray, products: Products, study: config.Study) -> Layer:
+def _height(data: xr.DataArray, products: Products, study: config.Study) -> maps.Layer:
     if "truth" in products:
         limits = height_limits(products["truth"])
     else:
         limits = height_limits(products["dem"], _FAILED_PERCENT)
-    return Layer(
+    return maps.Layer(
         data,
         style.colormap(study.figures.height_colormap, "figures.height_colormap"),
         limits,
@@ -90,36 +77,36 @@ def _height(data: xr.DataArray, products: Products, study: config.Study) -> Laye
     )
 
 
-def _true_height(products: Products, study: config.Study) -> Layer:
+def _true_height(products: Products, study: config.Study) -> maps.Layer:
     return _height(products["truth"]["height"], products, study)
 
 
-def _reconstructed_height(products: Products, study: config.Study) -> Layer:
+def _reconstructed_height(products: Products, study: config.Study) -> maps.Layer:
     return _height(products["dem"]["height"], products, study)
 
 
-def _reflectivity(products: Products, study: config.Study) -> Layer:
+def _reflectivity(products: Products, study: config.Study) -> maps.Layer:
     del study
     data = products["truth"]["reflectivity"]
     top = float(np.nanmax(data.values))
-    return Layer(data, style.colormap("magma"), (0.0, top or 1.0), "reflectivity")
+    return maps.Layer(data, style.colormap("magma"), (0.0, top or 1.0), "reflectivity")
 
 
-def _amplitude(channel: str, products: Products, study: config.Study) -> Layer:
+def _amplitude(channel: str, products: Products, study: config.Study) -> maps.Layer:
     amplitude = abs(products["images"]["image"])
     # One reference for both channels, so that their grey levels compare.
     top = max(float(amplitude.max()), np.finfo(np.float32).tiny)
     amplitude = amplitude.sel(channel=channel)
     data = amplitude.copy(data=20 * np.log10(np.maximum(amplitude.values / top, 1e-20)))
     limits = (-study.figures.amplitude_range_db, 0.0)
-    return Layer(
+    return maps.Layer(
         data, style.colormap("gray"), limits, "amplitude (dB)", maps.beyond(data.values, limits)
     )
 
 
-def _wrapped_phase(product: str, products: Products, study: config.Study) -> Layer:
+def _wrapped_phase(product: str, products: Products, study: config.Study) -> maps.Layer:
     field = products[product]["interferogram"]
-    return Layer(
+    return maps.Layer(
         field.copy(data=np.angle(field.values)),
         style.colormap(study.figures.phase_colormap, "figures.phase_colormap"),
         (-np.pi, np.pi),
@@ -128,7 +115,7 @@ def _wrapped_phase(product: str, products: Products, study: config.Study) -> Lay
     )
 
 
-def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
+def _unwrapped_phase(products: Products, study: config.Study) -> maps.Layer:
     del study
     data = products["unwrapped"]["phase"]
     known = data.values[np.isfinite(data.values)]
@@ -137,7 +124,7 @@ def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
     low, high = np.percentile(known, ends) / (np.pi / 2) if known.size else (-2.0, 2.0)
     first, last = int(np.floor(low)), int(np.ceil(high))
     limits = (first * np.pi / 2, max(last, first + 1) * np.pi / 2)
-    return Layer(
+    return maps.Layer(
         data,
         # The phase falls as the height rises (Eq. 1): reversed, high ground looks bright.
         style.colormap("viridis_r"),
@@ -145,13 +132,6 @@ def _unwrapped_phase(products: Products, study: config.Study) -> Layer:
         "phase (rad)",
         maps.beyond(data.values, limits),
         phase=True,
-    )
-
-
-def _coherence(products: Products, study: config.Study) -> Layer:
-    del study
-    return Layer(
-        products["interferogram"]["coherence"], style.colormap("gray"), (0.0, 1.0), "coherence"
     )
 
 
@@ -166,19 +146,6 @@ PANELS: dict[str, Panel] = {
     "h": Panel("reconstructed height", "dem", _reconstructed_height),
 }
 """The paper's eight panels; (a) is a surface and a map."""
-
-
-MEASURED: tuple[Panel, ...] = (
-    PANELS["c"],
-    PANELS["d"],
-    Panel("coherence", "interferogram", _coherence),
-    PANELS["e"],
-    PANELS["g"],
-    PANELS["h"],
-)
-"""What there is to show of the chain without the truth."""
-
-MEASURED_INPUTS: tuple[str, ...] = tuple(dict.fromkeys(panel.product for panel in MEASURED))
 
 
 def panel_inputs(letter: str) -> tuple[str, ...]:
@@ -275,39 +242,6 @@ def draw_single(letter: str, products: Products, study: config.Study) -> Figure:
     return figure
 
 
-@style.styled
-def draw_measured(products: Products, study: config.Study) -> Figure:
-    """Draw the chain from the images to the height, without any truth.
-
-    Parameters
-    ----------
-    products
-        Those of `MEASURED_INPUTS`.
-    study
-        The configuration.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-    """
-    left, bottom, pitch, width = 12.5, 10.0, 56.0, 38.0
-    _, height = maps.fit(products["dem"]["height"], width, 60)
-    figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + 2 * (height + _TITLE_MM))
-    for place, panel in enumerate(MEASURED):
-        row, column = divmod(place, 3)
-        box = left + column * pitch, bottom + (1 - row) * (height + _TITLE_MM), width, height
-        _draw(
-            figure,
-            box,
-            panel.layer(products, study),
-            f"({'abcdef'[place]}) {panel.title}",
-            label_x=row == 1,
-            label_y=column == 0,
-        )
-    return figure
-
-
 def _map(
     figure: Figure,
     box: tuple[float, float, float, float],
@@ -319,34 +253,11 @@ def _map(
     label_x: bool = True,
     label_y: bool = True,
 ) -> bool:
-    """Draw a panel's map in a box (left, bottom, width, height), mm; say if it has shadow."""
+    """Draw a panel's map in a box (left, bottom, width, height), mm; return if it has shadow."""
     title = f"{prefix}{PANELS[letter].title}{' (map)' if letter == 'a' else ''}"
     layer = PANELS[letter].layer(products, study)
-    axes = _draw(figure, box, layer, title, label_x=label_x, label_y=label_y)
+    axes = maps.draw_layer(figure, box, layer, title, label_x=label_x, label_y=label_y)
     return maps.outline_shadow(axes, products["truth"]["shadow"])
-
-
-def _draw(
-    figure: Figure,
-    box: tuple[float, float, float, float],
-    layer: Layer,
-    title: str,
-    *,
-    label_x: bool,
-    label_y: bool,
-) -> Axes:
-    """Draw a layer with its colour bar in a box (left, bottom, width, height), mm."""
-    axes = maps.place(figure, layer.data, box, title)
-    image = maps.draw(
-        axes,
-        layer.data,
-        colormap=layer.colormap,
-        limits=layer.limits,
-        label_x=label_x,
-        label_y=label_y,
-    )
-    maps.colorbar(axes, image, layer.label, extend=layer.extend, phase=layer.phase)
-    return axes
 
 
 def _surface(
@@ -407,3 +318,85 @@ def _surface(
     axes.set_ylabel("y (m)")
     title = f"{prefix}true height (m), vertical × {exaggeration}"
     style.write_title(figure, box[0], box[1] + box[3], title)
+
+
+def numbers(products: Products, study: config.Study) -> str:
+    """Return the share of shadow and the number of residues, as a sentence."""
+    del study
+    shadow = 100 * float(products["truth"]["shadow"].mean())
+    residues = int(np.count_nonzero(products["unwrapped"]["residue"].values))
+    return f"{shadow:.1f} % of the cells are in shadow; the filtered phase has {residues} residues."
+
+
+def _heights(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    thumbnails.heights(axes, product["height"], options)
+
+
+def _facets(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    x, y, _ = product["facet_position"].values.T
+    colours = product["reflectivity"].values
+    axes.scatter(x, y, c=colours, cmap="gray", s=0.15, linewidths=0)
+    axes.set_facecolor("black")
+    axes.set_aspect("equal")
+    axes.set_xlim(x.min(), x.max())
+    axes.set_ylim(y.min(), y.max())
+
+
+def _shadow(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    thumbnails.raster(axes, product["visible_fraction"].mean("channel"), "gray", 0, 1)
+
+
+def _image(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    low = -options.amplitude_range_db
+    axes.imshow(thumbnails.decibels(product["image"].values[0]), cmap="gray", vmin=low, vmax=0)
+
+
+def _phase(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    angle = product["interferogram"].copy(data=np.angle(product["interferogram"].values))
+    thumbnails.raster(axes, angle, style.colormap(options.phase_colormap), -np.pi, np.pi)
+
+
+def _unwrapped(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    low, high = thumbnails.ends(product["phase"].values)
+    thumbnails.raster(axes, product["phase"], style.colormap("viridis_r"), low, high)
+
+
+FIGURES = {
+    "fig3": declaration.Figure(
+        draw=draw_sheet,
+        title="From terrain to height",
+        caption=(
+            "The chain: true terrain and reflectivity, the two images, raw, filtered and "
+            "unwrapped phase, and the reconstructed height. Shadow is outlined."
+        ),
+        sections=("figures",),
+        inputs=SHEET_INPUTS,
+        numbers=numbers,
+    ),
+} | {
+    f"fig3{letter}": declaration.Figure(
+        draw=partial(draw_single, letter),
+        title=panel.title[0].upper() + panel.title[1:],
+        caption="A single panel of Figure 3.",
+        sections=("figures",),
+        inputs=panel_inputs(letter),
+        sheet="fig3",
+    )
+    for letter, panel in PANELS.items()
+}
+
+THUMBNAILS = {
+    "elevation": thumbnails.Thumbnail("terrain from a file", _heights),
+    "roughness": thumbnails.Thumbnail("small relief of the ground", _heights),
+    "terrain": thumbnails.Thumbnail("true height, as a raster", _heights),
+    "facets": thumbnails.Thumbnail("point scatterers and their reflectivity", _facets),
+    "truth": thumbnails.Thumbnail("share of positions that see the ground", _shadow),
+    "images": thumbnails.Thumbnail("image of the lower antenna", _image),
+    "interferogram": thumbnails.Thumbnail("phase between the images", _phase),
+    "filtered": thumbnails.Thumbnail("filtered phase", _phase),
+    "unwrapped": thumbnails.Thumbnail("unwrapped phase", _unwrapped),
+    "dem": thumbnails.Thumbnail("reconstructed height", _heights),
+}

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.figures import style, sweeps
+from vinsar.figures.drawing import declaration, style, sweeps, thumbnails
 from vinsar.foundations import variables
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -20,15 +22,17 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.floating]
 
-_DASHED, _DOTTED, _BROKEN = (0, (4, 1.5)), (0, (1, 1.2)), (0, (4, 1.2, 1, 1.2))
 _PURPLE = "#7b3294"
 _LOOKS = {
     ("rectangular", "none"): sweeps.Look("as received", style.ORANGE, "-", "o"),
-    ("hann", "none"): sweeps.Look("Hann window", style.BLUE, _DASHED, "s"),
-    ("rectangular", "common"): sweeps.Look("common part removed", style.INK, _BROKEN, "^"),
-    ("rectangular", "gate"): sweeps.Look("gate", _PURPLE, _DOTTED, "v"),
+    ("hann", "none"): sweeps.Look("Hann window", style.BLUE, style.DASHED, "s"),
+    ("rectangular", "common"): sweeps.Look(
+        "common part removed", style.INK, style.DASH_DOTTED, "^"
+    ),
+    ("rectangular", "gate"): sweeps.Look("gate", _PURPLE, style.DOTTED, "v"),
 }
 _LEAST_DB = -60.0
+_MATRIX_DB = 40.0
 
 
 @style.styled
@@ -105,9 +109,7 @@ def _levels(axes: Axes, sweep: xr.Dataset) -> None:
             sweeps.curve(axes, levels, std, look)
             values.append(std.values)
     limits = sweeps.around(*values, high=4.0)
-    axes.set_yscale("log")
-    axes.set_ylim(*limits)
-    sweeps.log_axis(axes.yaxis, limits)
+    sweeps.log_y(axes, limits)
     axes.xaxis.set_major_locator(style.round_ticks(8))
     axes.set_xlabel("coupling over the scene's mean power in a cell (dB)")
     axes.set_ylabel("height std, visible ground (cm)")
@@ -119,7 +121,7 @@ def _cost(axes: Axes, data: xr.Dataset) -> None:
     x, share = data["x"].values, data["common_share"].isel(channel=0)
     image = abs(data["point_image"].isel(channel=0))
     for row, (colour, line, marker) in enumerate(
-        ((style.BLUE, "-", "o"), (style.ORANGE, _DASHED, "s"))
+        ((style.BLUE, "-", "o"), (style.ORANGE, style.DASHED, "s"))
     ):
         y = float(data["y"][row])
         axes.plot(x, 1 - share.isel(y=row), color=colour, linestyle=line)
@@ -138,7 +140,7 @@ def _cost(axes: Axes, data: xr.Dataset) -> None:
         x,
         image.sel(suppression="gate").mean("y"),
         color=_PURPLE,
-        linestyle=_DOTTED,
+        linestyle=style.DOTTED,
         label="gate",
     )
     axes.set_xlim(0, x[-1])
@@ -148,3 +150,44 @@ def _cost(axes: Axes, data: xr.Dataset) -> None:
     axes.set_ylabel("amplitude left (1)")
     axes.set_title("(c) what a point target keeps")
     axes.legend(loc="lower right")
+
+
+def _matrix(name: str) -> Callable[[Axes, xr.Dataset, config.Figures], None]:
+    """Return what draws the lower channel's positions against frequency or range."""
+
+    def draw_matrix(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+        del options
+        values = thumbnails.decibels(product[name].values[0])
+        axes.imshow(values, cmap="gray", aspect="auto", vmin=-_MATRIX_DB, vmax=0)
+
+    return draw_matrix
+
+
+def _power(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    power = product["power"].values.reshape(-1, product.sizes["slant_range"])
+    axes.semilogy(product["slant_range"].values, power.T, color=style.INK, linewidth=0.6)
+
+
+FIGURES = {
+    "coupling": declaration.Figure(
+        draw=draw,
+        title="Coupling of transmitter and receiver",
+        caption=(
+            "The coupling of transmitter and receiver: mean power of the range profiles with "
+            "and without it; the spread of the height error on visible ground against its "
+            "level; and what its suppression leaves of a point target's amplitude, computed "
+            "(lines) and imaged (marks)."
+        ),
+        sections=("figures",),
+        inputs=("coupling",),
+        sweeps=("coupling",),
+    ),
+}
+
+THUMBNAILS = {
+    "echo": thumbnails.Thumbnail("clean echo: position against frequency", _matrix("echo")),
+    "received": thumbnails.Thumbnail("echo as received", _matrix("echo")),
+    "profiles": thumbnails.Thumbnail("range profiles: position against range", _matrix("profile")),
+    "coupling": thumbnails.Thumbnail("power over range, as received", _power),
+}

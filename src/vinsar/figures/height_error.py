@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.figures import chain, maps, style
+from vinsar.figures.drawing import declaration, maps, style, thumbnails
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,10 +49,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     figure = style.new_figure(style.TWO_COLUMNS_MM, bottom + height + 7)
 
     title = "(a) height error, reconstructed minus true"
-    shown = layer(accuracy)
-    axes = maps.place(figure, error, (left, bottom, width, height), title)
-    image = maps.draw(axes, shown.data, colormap=shown.colormap, limits=shown.limits)
-    maps.colorbar(axes, image, shown.label, extend=shown.extend)
+    axes = maps.draw_layer(figure, (left, bottom, width, height), layer(accuracy), title)
     if maps.outline_shadow(axes, accuracy["shadow"]):
         below = bottom + height - style.size_mm(axes)[1] - 11.5
         maps.explain_shadow(figure, left, below, maps.SHADOW_LABEL)
@@ -67,7 +64,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     return figure
 
 
-def layer(accuracy: xr.Dataset) -> chain.Layer:
+def layer(accuracy: xr.Dataset) -> maps.Layer:
     """Return the map of the height error, in centimetres up to three tolerances.
 
     Parameters
@@ -77,13 +74,13 @@ def layer(accuracy: xr.Dataset) -> chain.Layer:
 
     Returns
     -------
-    chain.Layer
+    maps.Layer
         Values with their colours.
     """
     error = accuracy["height_error"] * 100
     limit = 300 * float(accuracy["tolerance"])
     limits = (-limit, limit)
-    return chain.Layer(
+    return maps.Layer(
         error,
         style.colormap("cmc.vik"),
         limits,
@@ -218,3 +215,43 @@ def _table(axes: Axes, accuracy: xr.Dataset) -> None:
             )
     for level in (0.98, 0.62, 0.0):
         axes.plot([0, 1], [level, level], color=style.INK, linewidth=0.5, clip_on=False)
+
+
+def numbers(products: Products, study: config.Study) -> str:
+    """Return the statistics of the height error, as a sentence."""
+    del study
+    accuracy = products["accuracy"]
+    whole = accuracy.sel(region="whole_scene")
+    visible = accuracy.sel(region="visible_ground")
+    tolerance = 100 * float(accuracy["tolerance"])
+    return (
+        f"{100 * float(whole['fraction_within_tolerance']):.1f} % of {int(whole['cell_count'])} "
+        f"cells are within {tolerance:g} cm; standard deviation {100 * float(whole['std']):.2f} "
+        f"cm over the whole scene and {100 * float(visible['std']):.2f} cm on visible ground; "
+        f"largest error {100 * float(whole['maximum_absolute']):.1f} cm."
+    )
+
+
+def _error(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    del options
+    limit = 3 * float(product["tolerance"])
+    thumbnails.raster(axes, product["height_error"], style.colormap("cmc.vik"), -limit, limit)
+
+
+FIGURES = {
+    "fig4": declaration.Figure(
+        draw=draw,
+        title="Height error",
+        caption=(
+            "Height error, its statistics over the whole scene, visible ground and shadow, and "
+            "its histogram."
+        ),
+        sections=("figures",),
+        inputs=("accuracy",),
+        numbers=numbers,
+    ),
+}
+
+THUMBNAILS = {
+    "accuracy": thumbnails.Thumbnail("height error", _error),
+}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vinsar.figures import chain, height_error, maps, style
+from vinsar.figures import chain, height_error
+from vinsar.figures.drawing import declaration, maps, style
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,13 +126,13 @@ def statistics(accuracy: xr.Dataset) -> list[tuple[str, str]]:
     ]
 
 
-def _map(figure: Figure, place: int, name: str, layer: chain.Layer, shadow: xr.DataArray) -> bool:
-    """Draw a map in the place of this number, by row; say if it has shadow."""
+def _map(figure: Figure, place: int, name: str, layer: maps.Layer, shadow: xr.DataArray) -> bool:
+    """Draw a map in the place of this number, by row; return if it has shadow."""
     row, column = divmod(place, 3)
     # No wider than the map, so that its name begins where the map does.
     width, _ = maps.fit(layer.data, _MAP_MM, _TALL_MM)
     box = (_LEFT_MM + column * _PITCH_MM, _BOTTOMS_MM[row], width, _TALL_MM)
-    axes = maps.place(figure, layer.data, box, "")
+    axes = maps.draw_layer(figure, box, layer, "", label_x=row == 1, label_y=column == 0)
     figure.text(
         box[0] / _WIDTH_MM,
         (box[1] + _TALL_MM + 4) / _HEIGHT_MM,
@@ -139,13 +140,19 @@ def _map(figure: Figure, place: int, name: str, layer: chain.Layer, shadow: xr.D
         fontsize=style.points(8),
         fontweight="bold",
     )
-    image = maps.draw(
-        axes,
-        layer.data,
-        colormap=layer.colormap,
-        limits=layer.limits,
-        label_x=row == 1,
-        label_y=column == 0,
-    )
-    maps.colorbar(axes, image, layer.label, extend=layer.extend, phase=layer.phase)
     return maps.outline_shadow(axes, shadow)
+
+
+FIGURES = {
+    "summary": declaration.Figure(
+        draw=draw,
+        title="Front sheet",
+        caption=(
+            "The study on one sheet: true height, image of the lower antenna, filtered phase, "
+            "reconstructed height, its error, and the error's statistics."
+        ),
+        sections=("figures", "radar"),
+        inputs=INPUTS,
+        numbers=height_error.numbers,
+    ),
+}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.figures import style, sweeps
+from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.prediction import systems
 
 if TYPE_CHECKING:
@@ -106,3 +106,18 @@ def _bars(axes: Axes, values: list[float], form: str, label: str, *, log: bool =
             form.format(value), (value, row), (3, 0), textcoords="offset points", va="center"
         )
     axes.set_xlabel(label)
+
+
+FIGURES = {
+    "systems": declaration.Figure(
+        draw=draw,
+        title="The rail beside switched arrays",
+        caption=(
+            "The rail beside switched arrays: resolution along x and height of ambiguity at "
+            "the scene's middle on the ground, standard deviation of the height error, and "
+            "time for a scan."
+        ),
+        sections=("figures", "radar", "scene", "vehicle", "sweeps"),
+        sweeps=(systems.SWEEP,),
+    ),
+}

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from vinsar.figures import style, sweeps
+import numpy as np
+
+from vinsar.figures.drawing import declaration, style, sweeps, thumbnails
 from vinsar.foundations import variables
 from vinsar.radar import instrument
 from vinsar.study import config
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
 
 _LOOKS = {
     "x": sweeps.Look("error along x (the rail)", style.BLUE, "-", "o"),
-    "y": sweeps.Look("along y (ahead)", style.ORANGE, (0, (4, 1.5)), "s"),
-    "z": sweeps.Look("along z (up)", style.INK, (0, (4, 1.2, 1, 1.2)), "^"),
+    "y": sweeps.Look("along y (ahead)", style.ORANGE, style.DASHED, "s"),
+    "z": sweeps.Look("along z (up)", style.INK, style.DASH_DOTTED, "^"),
 }
 _MODES = {"common": "(a) common to both antennas", "independent": "(b) independent"}
 _HEIGHT_MM = 79.0
@@ -97,9 +99,7 @@ def _heights(axes: Axes, deviation: xr.DataArray, limits: tuple[float, float]) -
     levels = ordered["motion_level_wavelengths"].values
     for name in _axes_of(ordered):
         sweeps.curve(axes, levels, ordered.sel(motion_axis=name), _LOOKS[name], scale=100)
-    axes.set_yscale("log")
-    axes.set_ylim(*limits)
-    sweeps.log_axis(axes.yaxis, limits)
+    sweeps.log_y(axes, limits)
     _levels(axes, levels)
 
 
@@ -130,3 +130,51 @@ def _focus(axes: Axes, gain: xr.DataArray) -> None:
     axes.set_ylabel("amplitude left (1)")
     axes.set_title("(c) focus of a point target")
     _levels(axes, levels)
+
+
+def numbers(products: Products, study: config.Study) -> str:
+    """Return the spreads at about a tenth of a wavelength and at the highest level."""
+    del study
+    sweep = variables.swept(
+        products["sweeps/vibration"], "motion_channels", "motion_axis", "motion_level_wavelengths"
+    )
+    levels = np.sort(sweep["motion_level_wavelengths"].values)
+    shown = sorted({float(levels[np.searchsorted(levels, 0.1).clip(max=levels.size - 1)]),
+                    float(levels[-1])})  # fmt: skip
+    parts = []
+    for channels in sweep["motion_channels"].values:
+        for level in shown:
+            part = sweep["std"].sel(
+                region="whole_scene", motion_channels=channels, motion_level_wavelengths=level
+            )
+            values = ", ".join(
+                f"{100 * float(sweeps.spread(part.sel(motion_axis=axis))[0]):.1f} cm along {axis}"
+                for axis in sorted(sweep["motion_axis"].values)
+            )
+            parts.append(f"{channels} errors of {level:g} wavelengths: {values}")
+    return f"Mean spread under {'; '.join(parts)}."
+
+
+FIGURES = {
+    "fig5": declaration.Figure(
+        draw=draw,
+        title="Position errors",
+        caption=(
+            "Standard deviation of the height error over the whole scene against position "
+            "errors along three axes, common to both antennas as in the paper and independent, "
+            "and what they leave of a point target. Lines are means and bands 10 to 90 % of "
+            "the realizations. Grey: without errors; a DEM of level ground, whose error is the "
+            "relief itself; and a phase that is uniformly random, the height of ambiguity at "
+            "the scene's centre over the root of 12. Heights can be worse than that where "
+            "unwrapping adds whole cycles."
+        ),
+        sections=("figures", "radar", "scene", "sweeps"),
+        inputs=("truth",),
+        sweeps=("vibration",),
+        numbers=numbers,
+    ),
+}
+
+THUMBNAILS = {
+    "focus": thumbnails.Thumbnail("what position errors leave of a point target"),
+}

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar.figures import FIGURES, height_error, sweeps, thumbnails
+from vinsar.figures import FIGURES, THUMBNAILS, Thumbnail, height_error
+from vinsar.figures.drawing import sweeps, thumbnails
 from vinsar.radar import formulas, instrument
 from vinsar.results import lineage
 from vinsar.study import config, pipeline
@@ -179,8 +180,6 @@ class Sources:
         The study's products, and sweeps as ``sweeps/<name>``.
     figures
         The figures' files, of any format, in the order to show them.
-    captions
-        What each figure shows, by name.
     records
         Records of the results, as `vinsar.results.lineage.read_records` returns them.
     claims
@@ -193,7 +192,6 @@ class Sources:
     paper: Mapping[str, Any]
     products: Products
     figures: tuple[Path, ...]
-    captions: Mapping[str, str]
     records: Mapping[str, Mapping[str, Any]]
     claims: tuple[Mapping[str, Any], ...] = ()
     errata: str = ""
@@ -406,12 +404,13 @@ def _chain(sources: Sources) -> Section | None:
         if name not in sources.products:
             continue
         record = sources.records.get(f"{name}.nc", {})
+        thumbnail = THUMBNAILS.get(name, Thumbnail(name.replace("_", " ")))
         steps.append(
             Step(
                 name,
-                thumbnails.shows(name),
+                thumbnail.shows,
                 _seconds(record["seconds"]) if "seconds" in record else "",
-                thumbnails.png(name, sources.products[name], sources.study.figures),
+                thumbnails.png(thumbnail, sources.products[name], sources.study.figures),
             )
         )
     if not steps:
@@ -446,16 +445,11 @@ def _accuracy(sources: Sources) -> Section | None:
 def shown_figures(sources: Sources) -> list[str]:
     """Return the names of the figures that the report shows, the panels of a sheet left out."""
     names = list(dict.fromkeys(path.stem for path in sources.figures if path.suffix == ".png"))
-    return [
-        name
-        for name in names
-        if not any(name != sheet and name.startswith(sheet) and len(name) == len(sheet) + 1
-                   for sheet in names)
-    ]  # fmt: skip
+    return [name for name in names if FIGURES[name].sheet not in names]
 
 
 def _label(name: str) -> str:
-    title = FIGURES[name].title or name.replace("_", " ").capitalize()
+    title = FIGURES[name].title
     figure = name.removeprefix("fig")
     return f"Figure {figure}. {title}." if figure.isdigit() else f"{title}."
 
@@ -471,7 +465,7 @@ def _pictures(sources: Sources, *, only: tuple[str, ...] = ()) -> list[Block]:
         numbers = ""
         if figure.numbers is not None and all(key in sources.products for key in read):
             numbers = figure.numbers(sources.products, sources.study)
-        caption = " ".join(sources.captions.get(name, "").replace("``", "`").split())
+        caption = " ".join(figure.caption.replace("``", "`").split())
         png = files[name, ".png"]
         pictures.append(
             Picture(

@@ -1,0 +1,142 @@
+"""The height noise that sweeps measured against what the design sheet predicts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar.figures.design import OF_AXES, changed
+from vinsar.figures.drawing import declaration, style, sweeps
+from vinsar.foundations import variables
+from vinsar.foundations.constants import AXES
+from vinsar.prediction import design
+from vinsar.study import config
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from vinsar.study.pipeline import Products
+
+    Floats = NDArray[np.floating]
+
+
+@style.styled
+def draw(products: Products, study: config.Study) -> Figure:
+    """Draw the height noise that sweeps measured against what was predicted.
+
+    Parameters
+    ----------
+    products
+        ``sweeps/snr``, ``sweeps/baseline_length`` and ``sweeps/vibration``.
+    study
+        The configuration.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+    """
+    figure = style.new_figure(style.ONE_COLUMN_MM, 103.0)
+    axes = style.place(figure, 13.0, 28.0, 69.0, 69.0)
+    handles: list[Any] = []
+    everything: list[Floats] = []
+    for label, (predicted, measured), colour, marker in (
+        ("signal-to-noise ratio", _by_noise(products, study), style.BLUE, "o"),
+        ("length of the baseline", _by_baseline(products, study), style.ORANGE, "s"),
+        *(
+            (f"position errors along {name}", found, colour, "^v>"[AXES.index(name)])
+            for name, found, colour in _by_errors(products, study)
+        ),
+    ):
+        handles += axes.plot(
+            100 * predicted,
+            100 * measured,
+            color=colour,
+            linestyle="none",
+            marker=marker,
+            markersize=3.5,
+            markerfacecolor="white",
+            markeredgewidth=0.8,
+            label=label,
+        )
+        everything += [100 * predicted, 100 * measured]
+    limits = sweeps.around(*everything)
+    line = np.array(limits)
+    handles += axes.plot(line, line, color=style.GREY, linewidth=0.8, label="equal")
+    for factor, name in ((2.5, "factor of 2.5"), (0.4, "")):
+        drawn = axes.plot(
+            line, factor * line, color=style.GREY, linestyle=":", linewidth=0.8, label=name
+        )
+        handles += drawn if name else []
+    sweeps.log_x(axes, limits)
+    sweeps.log_y(axes, limits)
+    axes.set_xlabel("predicted height std (cm)")
+    axes.set_ylabel("measured, 1.48 MAD on visible ground (cm)")
+    axes.set_title("Predicted and measured height noise")
+    sweeps.legend(figure, handles, 8.0, 2.0, 2)
+    return figure
+
+
+def _sheet(study: config.Study, sweep: str, **changes: dict[str, Any]) -> design.Sheet:
+    parts = {name: config.swept_section(study, sweep, name) for name in design.SECTIONS}
+    return changed(parts, **changes)
+
+
+def _spread(sweep: Any) -> Floats:
+    measured = sweep["mad"].sel(region="visible_ground").mean("realization")
+    return np.asarray(sweeps.NORMAL * measured.values)
+
+
+def _by_noise(products: Products, study: config.Study) -> tuple[Floats, Floats]:
+    sweep = variables.swept(products["sweeps/snr"], "echo_snr_db")
+    levels = [None if np.isnan(v) else float(v) for v in sweep["echo_snr_db"].values]
+    predicted = [_sheet(study, "snr", echo={"snr_db": v}).scene_height_std() for v in levels]
+    return np.array(predicted), _spread(sweep)
+
+
+def _by_baseline(products: Products, study: config.Study) -> tuple[Floats, Floats]:
+    sweep = variables.swept(products["sweeps/baseline_length"], "radar_baseline_m")
+    predicted = [
+        _sheet(study, "baseline_length", radar={"baseline_m": float(length)}).scene_height_std()
+        for length in sweep["radar_baseline_m"].values
+    ]
+    return np.array(predicted), _spread(sweep)
+
+
+def _by_errors(
+    products: Products, study: config.Study
+) -> list[tuple[str, tuple[Floats, Floats], str]]:
+    keys = ("motion_channels", "motion_axis", "motion_level_wavelengths")
+    sweep = variables.swept(products["sweeps/vibration"], *keys)
+    sheet = _sheet(study, "vibration")
+    found = []
+    for axis, (name, (_, colour, _)) in enumerate(zip(AXES, OF_AXES, strict=True)):
+        if (
+            not {"independent"} <= set(sweep["motion_channels"].values)
+            or name not in sweep["motion_axis"]
+        ):
+            continue
+        part = sweep.sel(motion_channels="independent", motion_axis=name)
+        predicted = [
+            sheet.scene_height_std(axis, float(level) * sheet.instrument.wavelength)
+            for level in part["motion_level_wavelengths"].values
+        ]
+        found.append((name, (np.array(predicted), _spread(part)), colour))
+    return found
+
+
+FIGURES = {
+    "design_check": declaration.Figure(
+        draw=draw,
+        title="Prediction and measurement",
+        caption=(
+            "Height noise measured by the sweeps against its prediction. Where the phase no "
+            "longer unwraps (the longest baselines, large position errors along y) the "
+            "measured spread leaves the prediction."
+        ),
+        sections=("figures", "sweeps", *design.SECTIONS),
+        sweeps=("snr", "baseline_length", "vibration"),
+    ),
+}

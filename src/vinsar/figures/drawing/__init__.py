@@ -1,0 +1,1 @@
+"""What the figures share: declaration, style, maps, curves of sweeps, and writing to files."""

@@ -1,0 +1,54 @@
+"""The length of the baseline: the sweep, the bound and the optimum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vinsar.figures import FIGURES, baseline_length
+from vinsar.figures.drawing import sweeps
+
+
+def test_baseline_length_shows_the_sweep_the_bound_and_the_optimum(
+    make_sweep, draw, written, lines_of, products, study
+):
+    length = [0.1, 0.2, 0.3, 0.5, 1.0]
+    std = np.array([0.09, 0.05, 0.02, 0.0205, 0.06])
+    sweep = make_sweep({"radar.baseline_m": length}, std, realizations=3)
+    sweep["std"].values[:] = std[:, None, None] * np.array([1, 0.5, 2])
+    figure = draw("baseline_length", products | {"sweeps/baseline_length": sweep}, study)
+    spreads, ambiguity, coherence = figure.axes
+    lines = lines_of(spreads)
+    np.testing.assert_allclose(lines["std, whole scene"].get_ydata(), 100 * std)
+    np.testing.assert_allclose(lines["std, visible ground"].get_ydata(), 50 * std)
+    robust = 148.26 * sweep["mad"].sel(region="visible_ground").mean("realization")
+    np.testing.assert_allclose(lines["1.48 MAD, visible ground"].get_ydata(), robust)
+    # Written out: the coherence of level ground, the looks of the window, the phase, the height.
+    r1, wavelength, cell = np.hypot(11.0, 2.0), 299_792_458.0 / 14e9, 299_792_458.0 / 4e9
+    r2 = np.hypot(11.0, 2.0 + np.array(length))
+    # The channels share the wavenumbers from 13 GHz at y / r1 to 15 GHz at y / r2.
+    gamma = (15 / r2 - 13 / r1) / (2 / np.sqrt(r1 * r2))
+    looks = 0.25**2 / (wavelength * r1 / 1.6 * cell * r1 / 11)
+    phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
+    height = wavelength * r2 / (2 * np.array(length))
+    bound = height / (2 * np.pi) * phase
+    critical = np.sqrt((15 / 13 * r1) ** 2 - 11**2) - 2
+    assert sweeps.looks(study, "baseline_length") == pytest.approx(looks)
+    np.testing.assert_allclose(
+        lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), 100 * bound
+    )
+    np.testing.assert_allclose(ambiguity.lines[0].get_ydata(), height)
+    np.testing.assert_allclose(coherence.lines[1].get_ydata(), gamma)
+    for axes in figure.axes:
+        marks = [line.get_xdata()[0] for line in axes.lines if len(set(line.get_xdata())) == 1]
+        assert any(mark == pytest.approx(critical / 4) for mark in marks)
+    texts = written(figure)
+    assert "least: 2.00 cm at 0.3 m" in texts
+    assert "within 10 % of it: 0.3 … 0.5 m" in texts
+    assert baseline_length.best_lengths(sweep) == (0.3, 0.3, 0.5)
+
+
+def test_the_caption_gives_the_best_length(products, study):
+    best, _, _ = baseline_length.best_lengths(products["sweeps/baseline_length"])
+    said = FIGURES["baseline_length"].numbers(products, study)
+    assert f"is that of {best:g} m" in said

@@ -1,0 +1,32 @@
+"""Thermal noise: the sweep and the bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vinsar.figures.drawing import sweeps
+from vinsar.radar.instrument import Instrument
+
+
+def test_snr_shows_the_sweep_and_the_bound(draw, lines_of, products, study):
+    lines = lines_of(draw("snr", products, study).axes[0])
+    sweep = products["sweeps/snr"]
+    ratio = sweep["echo_snr_db"].values
+    std = sweep["std"].mean("realization")
+    np.testing.assert_allclose(
+        lines["std, whole scene"].get_ydata(), 100 * std.sel(region="whole_scene")
+    )
+    np.testing.assert_array_equal(lines["std, whole scene"].get_xdata(), ratio)
+    planned, place = Instrument.planned(study.radar), (0.0, 11.0)
+    gamma = planned.geometric_coherence(*place) / (1 + 10 ** (-ratio / 10))
+    looks = sweeps.looks(study, "snr")
+    phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
+    expected = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi) * phase
+    np.testing.assert_allclose(
+        lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), expected
+    )
+
+
+def test_it_is_as_wide_as_a_column(usual):
+    assert usual("snr").get_figwidth() * 25.4 == pytest.approx(88)
