@@ -129,7 +129,7 @@ def test_a_filter_setting_reruns_the_filter_and_what_follows(checkout):
 
 
 def test_an_edit_of_filtering_reruns_the_filter_and_what_follows(checkout):
-    path = checkout.folder / "src/vinsar/filtering.py"
+    path = checkout.folder / "src/vinsar/processing/filtering.py"
     before = path.read_text()
     path.write_text(before + "\n_EDITED = True\n")
     try:
