@@ -23,13 +23,7 @@ pathvars:
 
 
 include: "workflow/rules/own_data.smk"
-include: "workflow/rules/scene.smk"
-include: "workflow/rules/echo.smk"
-include: "workflow/rules/imaging.smk"
-include: "workflow/rules/registration.smk"
-include: "workflow/rules/interferogram.smk"
-include: "workflow/rules/height.smk"
-include: "workflow/rules/detection.smk"
+include: "workflow/rules/stages.smk"
 include: "workflow/rules/sweep.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"

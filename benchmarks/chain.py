@@ -9,7 +9,8 @@ import dask
 import numpy as np
 
 from vinsar.foundations import blocks
-from vinsar.study import config, pipeline, validation
+from vinsar.foundations.configuration import Study
+from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[1]
 FRAME = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
@@ -32,7 +33,7 @@ def frames(count=60, workers=2):
 
     Each frame is computed by one thread; Dask's threads compute frames side by side.
     """
-    chosen: config.Study = study(coarse=True)
+    chosen: Study = study(coarse=True)
     products = pipeline.run(chosen, only="dem")
     expected = products["dem"]["height"].values
 

@@ -12,7 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from vinsar.study import config, validation
+from vinsar.study import validation
+from vinsar.study.options import Dask, Sweep
 from vinsar.sweeps import cluster, sweep
 
 ROOT = Path(__file__).parents[1]
@@ -23,9 +24,9 @@ def run(count):
     study = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
     heights = [number * 1e-6 for number in range(count // 5)]
     one = {"over": {"height.level_ground_height_m": heights}, "realizations": 5, "base": {}}
-    study = study.model_copy(update={"sweeps": {"many": config.Sweep.model_validate(one)}})
+    study = study.model_copy(update={"sweeps": {"many": Sweep.model_validate(one)}})
     rows = {}
-    with cluster.workers(config.Dask(scheduler="threads", address=None), 1) as compute:
+    with cluster.workers(Dask(scheduler="threads", address=None), 1) as compute:
         sweep.run(
             study,
             "many",

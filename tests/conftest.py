@@ -10,6 +10,7 @@ from vinsar.foundations import variables
 from vinsar.processing import focusing
 from vinsar.radar import trajectory
 from vinsar.simulation import echo
+from vinsar.study import composition  # noqa: F401, which declares all products
 
 settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=60)
 settings.load_profile("reproducible")

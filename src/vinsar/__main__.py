@@ -7,12 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
 from vinsar.results import lineage, reproduction
-from vinsar.study import config, ingest
+from vinsar.study import ingest
 
 
-def _study(name: str, files: list[str]) -> config.Study | None:
+def _study(name: str, files: list[str]) -> Study | None:
     """Return the configuration as it is now, or nothing where it is not known."""
     own = Path("config") / f"{name}.yaml"
     paths = [Path("config/paper.yaml"), *([own] if own.stem != "paper" else [])]
@@ -103,11 +104,19 @@ def _crate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _known_study(name: str, files: list[str]) -> config.Study:
+def _known_study(name: str, files: list[str]) -> Study:
     study = _study(name, files)
     if study is None:
         raise ValueError(f"config/{name}.yaml is not there; name the study's with --configfile")
     return study
+
+
+def _schema(arguments: argparse.Namespace) -> int:
+    del arguments
+    from vinsar.study import reference
+
+    sys.stdout.write(reference.schema())
+    return 0
 
 
 def _export(arguments: argparse.Namespace) -> int:
@@ -150,6 +159,8 @@ def main() -> int:
     export.add_argument("folder")
     export.add_argument("file")
     export.set_defaults(answer=_export)
+    schema = commands.add_parser("schema", help="print the JSON schema of a study's file")
+    schema.set_defaults(answer=_schema)
     arguments = parser.parse_args()
     try:
         return int(arguments.answer(arguments))

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vinsar.evaluation import baseline_errors
 from vinsar.foundations import variables
 from vinsar.radar import baseline, formulas, geometry, speckle
 from vinsar.study import validation
@@ -22,7 +23,7 @@ def view(x_m=0.0, y_m=13.0, antenna_height_m=2.0):
 
 
 def errors(seen, seed=1, baseline_m=BASELINE_M):
-    return baseline.angle_errors(
+    return baseline_errors.angle_errors(
         seen,
         baseline_m=baseline_m,
         length_std_m=LENGTH_STD_M,

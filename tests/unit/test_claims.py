@@ -4,10 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar.foundations import variables
 from vinsar.paper import claims
 from vinsar.processing import detection
 from vinsar.study import pipeline, validation
+from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,7 +38,7 @@ def shaken(levels=LEVELS, scatter=0.0, **curves):
     one = np.array([list(axes[name]) for name in "xyz"])[:, :, None] * realizations
     std = np.stack([one, 10 * one])
     data = {}
-    for name, variable in variables.SWEEP.items():
+    for name, variable in SWEEP.items():
         values = std
         for size in (3 if dim == "region" else 2 for dim in variable.dims):
             values = np.repeat(values[..., None], size, axis=-1)
@@ -48,7 +48,7 @@ def shaken(levels=LEVELS, scatter=0.0, **curves):
         "motion_axis": (np.array(list("xyz")), {}),
         "motion_level_wavelengths": (np.array(levels), {}),
     }
-    return variables.sweep_dataset(data, swept)
+    return sweep_dataset(data, swept)
 
 
 def verdicts(products, study):

@@ -11,6 +11,7 @@ from vinsar.foundations import variables
 from vinsar.foundations.constants import REGIONS
 from vinsar.results import provenance, storage
 from vinsar.sweeps import sweep
+from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
 HIGH = 3
 LABELS = {
@@ -90,9 +91,9 @@ def swept():
     leading = [*(len(labels) for labels, _ in keys.values()), 2]
     data = {
         name: values(variable, [*leading, *(SIZES[dim] for dim in variable.dims)])
-        for name, variable in variables.SWEEP.items()
+        for name, variable in SWEEP.items()
     }
-    return variables.sweep_dataset(data, keys)
+    return sweep_dataset(data, keys)
 
 
 def write(path, name):

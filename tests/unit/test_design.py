@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
 from vinsar.radar import aperture, baseline, formulas, geometry, trajectory
-from vinsar.study import config, validation
+from vinsar.study import validation
 
 CONFIG = Path(__file__).parents[2] / "config"
 WAVELENGTH = 299_792_458.0 / 14e9
@@ -20,7 +21,7 @@ PIT = {"shape": "pit", "x_m": 1.0, "y_m": 13.0, "diameter_m": 0.6, "depth_m": 0.
 PAPER = validation.load(CONFIG / "paper.yaml")
 
 
-def study_with(**sections: dict[str, Any]) -> config.Study:
+def study_with(**sections: dict[str, Any]) -> Study:
     raw = PAPER.model_dump(mode="json") | {"sweeps": {}, "variants": {}}
     raw["outputs"] = {"figures": [], "claims": False}
     return validation.check(validation.merge(raw, sections))

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from vinsar.foundations import variables
 from vinsar.processing import detection
-from vinsar.study import config
+from vinsar.processing.detection import Detection
 
 OPTIONS = {
     "threshold_m": 0.1,
@@ -59,7 +59,7 @@ def detect(ideal_phase):
             },
             {"x": X, "y": Y},
         )
-        options = config.Detection.model_validate(OPTIONS | changes)
+        options = Detection.model_validate(OPTIONS | changes)
         return detection.detect(dem, image, interferogram, options=options, looks=LOOKS)
 
     return make

@@ -9,9 +9,11 @@ from pydantic import TypeAdapter
 from vinsar.evaluation import detection_accuracy
 from vinsar.foundations import variables
 from vinsar.processing import detection
-from vinsar.study import config
+from vinsar.processing.detection import Detection
+from vinsar.simulation.scene import SceneObject
+from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
-OPTIONS = config.Detection(
+OPTIONS = Detection(
     threshold_m=0.1,
     noise_factor=3.0,
     minimum_area_m2=0.02,
@@ -22,7 +24,7 @@ OPTIONS = config.Detection(
     amplitude_threshold_db=6.0,
 )
 X, Y = np.arange(-20, 21) * 0.1, 10 + np.arange(31) * 0.1
-OBJECTS = TypeAdapter(tuple[config.SceneObject, ...]).validate_python(
+OBJECTS = TypeAdapter(tuple[SceneObject, ...]).validate_python(
     [
         {"shape": "box", "x_m": -1, "y_m": 11, "size_x_m": 0.4, "size_y_m": 0.4, "height_m": 0.2},
         {"shape": "pit", "x_m": 1, "y_m": 12, "diameter_m": 0.4, "depth_m": 0.3},
@@ -139,12 +141,12 @@ def swept(*cases):
         name: np.stack([case[name].values.astype(float) for case in cases])[:, None]
         for name in cases[0].data_vars
     }
-    for name, variable in variables.SWEEP.items():
+    for name, variable in SWEEP.items():
         sizes = {"region": 3, "channel": 2, "ground_axis": 2}
         data[name] = np.ones((len(cases), 1, *(sizes[dim] for dim in variable.dims)))
     axis = (0.01 * np.arange(len(cases)), {"long_name": "scene.roughness_std_m"})
     coords = {name: cases[0][name].values for name in cases[0].coords if name not in "xy"}
-    return variables.sweep_dataset(data, {"scene_roughness_std_m": axis}, coords)
+    return sweep_dataset(data, {"scene_roughness_std_m": axis}, coords)
 
 
 def test_the_roc_is_of_obstacles_above_ground_and_of_alarms_by_area():

@@ -10,8 +10,10 @@ import pytest
 import rasterio
 import xarray as xr
 
+from vinsar.foundations.configuration import Study
+from vinsar.foundations.errors import ConfigurationError
 from vinsar.results import storage
-from vinsar.study import config, ingest, pipeline, validation
+from vinsar.study import ingest, pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 FILES = (ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
@@ -71,7 +73,7 @@ def own_echoes(path, **sections):
 
 def said(file, ask):
     """Return the one sentence about a file that is refused."""
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         ask()
     (fault,) = caught.value.faults
     assert fault.key in {"scene.file", "measurement.file"}
@@ -423,7 +425,7 @@ def test_complex_numbers_of_netcdf_s_own_kind_are_refused(tmp_path):
 
 
 def test_the_image_must_suit_the_measured_radar(echo_file):
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         own_echoes(echo_file, imaging={"y_max_m": 40.0})
     assert [fault.key for fault in caught.value.faults] == ["imaging.y_max_m"]
 
@@ -439,4 +441,4 @@ def test_what_a_file_gives_must_be_given(terrain_file, echo_file):
 
 def test_nothing_is_read_for_a_simulated_study(study):
     assert ingest.read(study) == {}
-    assert isinstance(ingest.load(*FILES), config.Study)
+    assert isinstance(ingest.load(*FILES), Study)

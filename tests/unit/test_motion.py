@@ -9,7 +9,8 @@ from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.processing import focusing
 from vinsar.radar import motion, trajectory, waveform
 from vinsar.simulation import echo
-from vinsar.study import config, pipeline
+from vinsar.study import pipeline
+from vinsar.study.composition import StudyModel
 
 FREQUENCY = waveform.frequencies(13e9, 15e9, 101)
 WAVELENGTH = waveform.wavelength(waveform.carrier(FREQUENCY))
@@ -102,7 +103,7 @@ def errors_of(rail, affected="recorded", seed=1, realization=0, **options):
         "axis": "y", "level_wavelengths": 0.1, "distribution": "uniform", "channels": "common",
         "spectrum": "white", "cycles_per_aperture": 2.0, "affects": "recorded",
     } | options  # fmt: skip
-    study = config.Study.part(
+    study = StudyModel.part(
         {
             "seed": seed, "realization": realization, "motion": section, "vehicle": STANDING,
             "radar.start_frequency_hz": 13e9, "radar.stop_frequency_hz": 15e9,
@@ -277,7 +278,7 @@ SCAN = STANDING | {"forward_speed_m_per_s": 4.0}
 
 def driven(rail, name, section=STILL, realization=0, **options):
     """Way ahead of the antennas in one of the trajectories of a study, (channel, position), m."""
-    study = config.Study.part(
+    study = StudyModel.part(
         {
             "seed": 1, "realization": realization, "motion": section, "vehicle": SCAN | options,
             "radar.start_frequency_hz": 13e9, "radar.stop_frequency_hz": 15e9,

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import dask
@@ -6,7 +7,10 @@ import pytest
 import xarray as xr
 
 from vinsar.foundations import variables
-from vinsar.study import config, pipeline, validation
+from vinsar.foundations.configuration import Study
+from vinsar.processing import interferogram
+from vinsar.processing.height import ControlPoint
+from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
 PROCESSING = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
@@ -22,7 +26,7 @@ def products(study):
     return pipeline.run(study)
 
 
-def changed(study: config.Study, section: str, **values) -> config.Study:
+def changed(study: Study, section: str, **values) -> Study:
     part = getattr(study, section).model_copy(update=values)
     return study.model_copy(update={section: part})
 
@@ -57,7 +61,7 @@ def test_processing_is_blind_to_the_terrain_but_for_the_echo(study, products):
 
 def test_a_stage_cannot_read_a_section_that_it_does_not_declare(study, products, monkeypatch):
     stage = pipeline.STAGES["filtered"]
-    blind = pipeline.Stage(stage.compute, stage.inputs, (), stage.modules)
+    blind = replace(stage, sections=())
     monkeypatch.setitem(pipeline.STAGES, "filtered", blind)
     with pytest.raises(AttributeError, match="filtering"):
         pipeline.run_stage("filtered", products, study)
@@ -99,7 +103,7 @@ def test_hidden_facets_echo_only_without_occlusion(study, products):
 
 def test_control_points_and_level_ground_agree(study, products):
     points = tuple(
-        config.ControlPoint(x_m=x, y_m=10.1, height_m=float(height))
+        ControlPoint(x_m=x, y_m=10.1, height_m=float(height))
         for x, height in zip(
             (-0.7, 0.7),
             products["truth"]["height"].sel(y=10.1, x=[-0.7, 0.7], method="nearest").values,
@@ -116,9 +120,9 @@ def test_control_points_and_level_ground_agree(study, products):
 def test_the_looks_count_resolution_cells(study, products):
     fine = changed(study, "interferogram", coherence_window_px=1)
     wide = changed(study, "interferogram", coherence_window_px=31)
-    assert pipeline.looks(products["trajectory"], fine) == 1
+    assert interferogram.looks(products["trajectory"], fine) == 1
     # 31 pixels of 5 cm against cells of about 0.074 m x 0.20 m (0.6 m aperture, 11.2 m range).
-    found = pipeline.looks(products["trajectory"], wide)
+    found = interferogram.looks(products["trajectory"], wide)
     assert found == pytest.approx(1.55**2 / (0.0763 * 0.2), rel=0.03)
 
 

@@ -16,9 +16,10 @@ import yaml
 from vinsar import figures, report
 from vinsar.figures.drawing import style
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import Study
 from vinsar.report import content
 from vinsar.results import lineage
-from vinsar.study import config
+from vinsar.study.composition import StudyModel
 
 ROOT = Path(__file__).parents[2]
 PAPER = yaml.safe_load((ROOT / "config/paper.yaml").read_text(encoding="utf-8"))
@@ -48,15 +49,15 @@ RECORD: dict[str, Any] = {
 }
 
 
-def make_study(**sections: Any) -> config.Study:
+def make_study(**sections: Any) -> Study:
     values = {
         name: section | sections.get(name, {}) if isinstance(section, dict) else section
         for name, section in PAPER.items()
     }
-    return config.Study.model_validate(values)
+    return StudyModel.model_validate(values)
 
 
-def sources(study: config.Study | None = None, **parts: Any) -> report.Sources:
+def sources(study: Study | None = None, **parts: Any) -> report.Sources:
     given: dict[str, Any] = {
         "study": study or make_study(),
         "paper": PAPER,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from vinsar.simulation import scene
-from vinsar.study import config
+from vinsar.simulation.scene import Patch, SceneObject
 
 
 def make(name="peaks", **changes):
@@ -180,7 +180,7 @@ def test_facets_larger_than_the_terrain_are_one_facet():
     np.testing.assert_allclose(facets["facet_position"].values, [[0, 13, 0]], atol=1e-12)
 
 
-OBJECT = TypeAdapter(config.SceneObject)
+OBJECT = TypeAdapter(SceneObject)
 
 
 def rough(std_m=0.0, correlation_m=0.2, seed=3):
@@ -266,7 +266,7 @@ def test_objects_stand_on_the_terrain_and_add_up(peaks):
 def test_reflectivity_is_that_of_patches_and_objects_and_has_no_height():
     terrain = make("flat")
     place = {"x_m": 0, "y_m": 12, "size_x_m": 1, "size_y_m": 1}
-    patch = config.Patch.model_validate(place | {"reflectivity": 2.0})
+    patch = Patch.model_validate(place | {"reflectivity": 2.0})
     pit = {"shape": "pit", "x_m": 0, "y_m": 12, "diameter_m": 0.4, "depth_m": 0.6}
     plain, bright = (OBJECT.validate_python(pit | extra) for extra in ({}, {"reflectivity": 3.0}))
     found = furnish(terrain, patches=[patch])

@@ -6,12 +6,17 @@ import pytest
 import xarray as xr
 
 from vinsar.foundations import variables
+from vinsar.foundations.errors import ConfigurationError
 from vinsar.results import storage
-from vinsar.study import config, pipeline, validation
+from vinsar.simulation.scene import Scene
+from vinsar.study import pipeline, validation
+from vinsar.study.composition import StudyModel
+from vinsar.study.options import Sweep
 from vinsar.sweeps import sweep
+from vinsar.sweeps.sweep import SWEEP
 
 ROOT = Path(__file__).parents[2]
-STATISTICS = {name for name in variables.SWEEP if variables.SWEEP[name].dims == ("region",)}
+STATISTICS = {name for name in SWEEP if SWEEP[name].dims == ("region",)}
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +34,7 @@ def memo(monkeypatch):
 
 def with_sweep(study, over, realizations=1, base=None):
     raw = {"over": over, "realizations": realizations, "base": base or {}}
-    return study.model_copy(update={"sweeps": {"quick": config.Sweep.model_validate(raw)}})
+    return study.model_copy(update={"sweeps": {"quick": Sweep.model_validate(raw)}})
 
 
 def in_turn(function, blocks, receive, lost):
@@ -291,7 +296,7 @@ def test_a_stage_that_failed_is_computed_again(tiny, memo, monkeypatch):
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_before_anything_runs(tiny, memo, over, said):
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         run(with_sweep(tiny, over))
     assert said in str(caught.value)
     assert "sweeps.quick" in str(caught.value)
@@ -300,7 +305,7 @@ def test_what_is_wrong_is_said_before_anything_runs(tiny, memo, over, said):
 
 def test_a_wrong_base_is_said_once(tiny):
     study = with_sweep(tiny, {"motion.axis": ["x", "y"]}, 2, {"imaging": {"grid_spacing_m": 0.03}})
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         sweep.studies(study, "quick")
     assert "sweeps.quick at {'motion.axis': 'x'}: imaging.grid_spacing_m" in str(caught.value)
     assert "'motion.axis': 'y'" not in str(caught.value)
@@ -309,7 +314,7 @@ def test_a_wrong_base_is_said_once(tiny):
 @pytest.mark.parametrize("wrong", [{}, {"motion.axis": []}])
 def test_a_sweep_over_nothing_is_no_configuration(wrong):
     with pytest.raises(ValueError, match="at least 1"):
-        with_sweep(config.Study.model_construct(), wrong)
+        with_sweep(StudyModel.model_construct(), wrong)
 
 
 def failing_at(level):
@@ -382,7 +387,7 @@ def test_few_cases_are_spread_and_many_are_bundled():
 def with_objects(study):
     box = {"shape": "box", "x_m": 0, "y_m": 11, "size_x_m": 0.4, "size_y_m": 0.4, "height_m": 0.2}
     scene = study.scene.model_dump() | {"terrain": "flat", "objects": [box]}
-    return study.model_copy(update={"scene": config.Scene.model_validate(scene)})
+    return study.model_copy(update={"scene": Scene.model_validate(scene)})
 
 
 def test_a_scene_with_objects_is_swept_with_how_well_they_are_found(tiny, tmp_path):
@@ -399,13 +404,13 @@ def test_a_scene_with_objects_is_swept_with_how_well_they_are_found(tiny, tmp_pa
     storage.write(found, path, "sweep")
     xr.testing.assert_identical(storage.read(path, "sweep").drop_attrs(), found.drop_attrs())
     # Without objects nothing of the detection is read.
-    with pytest.raises(validation.ConfigurationError, match="no stage of a case reads it"):
+    with pytest.raises(ConfigurationError, match="no stage of a case reads it"):
         run(with_sweep(tiny, over))
 
 
 def test_objects_themselves_are_not_swept(tiny):
     over = {"scene.objects": [[], [{"shape": "pit"}]]}
-    with pytest.raises(validation.ConfigurationError, match="must be the same in all cases"):
+    with pytest.raises(ConfigurationError, match="must be the same in all cases"):
         run(with_sweep(with_objects(tiny), over))
 
 

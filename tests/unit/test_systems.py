@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vinsar.foundations import variables
 from vinsar.prediction import systems
-from vinsar.study import config, validation
+from vinsar.study import validation
+from vinsar.study.options import Sweep
+from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
 CONFIG = Path(__file__).parents[2] / "config"
 
@@ -24,12 +25,12 @@ def sweep(study):
     """The shipped study's sweep with made up statistics: the number of the arrangement."""
     count = len(study.sweeps["systems"].over["radar"])
     data = {}
-    for name, variable in variables.SWEEP.items():
+    for name, variable in SWEEP.items():
         trailing = [{"region": 3, "channel": 2, "ground_axis": 2}[dim] for dim in variable.dims]
         values = np.arange(count).reshape(count, 1, *[1] * len(trailing))
         values = np.broadcast_to(values, (count, 2, *trailing))
         data[name] = values if name == "residues" else values / 100
-    return variables.sweep_dataset(data, {"radar": (np.arange(count), {"long_name": "radar"})})
+    return sweep_dataset(data, {"radar": (np.arange(count), {"long_name": "radar"})})
 
 
 def test_each_arrangement_has_its_own_numbers(sweep, study):
@@ -58,7 +59,7 @@ def test_the_table_has_a_row_an_arrangement(sweep, study):
 
 
 def test_a_sweep_over_other_keys_is_refused(sweep, study):
-    other = config.Sweep(over={"radar.baseline_m": (0.1, 0.2)}, realizations=2, base={})
+    other = Sweep(over={"radar.baseline_m": (0.1, 0.2)}, realizations=2, base={})
     changed = study.model_copy(update={"sweeps": {"systems": other}})
     with pytest.raises(ValueError, match=r"goes over radar\.baseline_m; radar alone"):
         systems.compare(sweep, changed)

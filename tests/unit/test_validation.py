@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from vinsar.foundations.errors import ConfigurationError
 from vinsar.study import validation
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -28,7 +29,7 @@ def changed(**values):
 
 
 def faults(raw) -> dict[str, str]:
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         validation.check(raw)
     assert all(str(fault) in str(caught.value) for fault in caught.value.faults)
     return {fault.key: fault.allowed for fault in caught.value.faults}
@@ -282,7 +283,7 @@ def test_a_missing_file_is_named(tmp_path):
 def test_variants_are_checked_as_studies_all_at_once():
     raw = changed(variants={"good": {"seed": 1}, "bad": {"seed": -1}, "worse": {"rader": {}}})
     study = validation.check(raw)
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         validation.variants(study)
     assert [fault.key for fault in caught.value.faults] == [
         "variants.bad: seed",
@@ -341,11 +342,11 @@ def test_sweeps_and_variants_keep_to_the_one_file_of_a_terrain():
         },
     )
     study = validation.check(raw)
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         validation.sweep_studies(study, "wide")
     (fault,) = caught.value.faults
     assert "{'scene.x_max_m': 2.0}: scene.x_max_m" in fault.key
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         validation.variants(study)
     assert [fault.key for fault in caught.value.faults] == [
         "variants.turned: scene.heading_deg",

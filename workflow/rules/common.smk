@@ -8,11 +8,12 @@ from snakemake.logging import logger
 from vinsar import figures
 from vinsar import report as study_report
 from vinsar.evaluation import detection_accuracy
+from vinsar.foundations.errors import ConfigurationError
 from vinsar.paper import claims
 from vinsar.prediction import systems
 from vinsar.results import provenance
-from vinsar.study import config as vinsar_config
-from vinsar.study import ingest, pipeline, validation
+from vinsar.simulation.scene import ELEVATION
+from vinsar.study import composition, ingest, pipeline, validation
 from vinsar.sweeps import sweep
 
 try:
@@ -22,7 +23,7 @@ try:
     if workflow.is_main_process:
         # For its faults alone: a file of the user's own is found wanting before anything runs.
         ingest.read(STUDY)
-except validation.ConfigurationError as error:
+except ConfigurationError as error:
     raise WorkflowError(str(error)) from None
 
 for sentence in validation.advice(STUDY):
@@ -45,7 +46,7 @@ def sources_of(*modules, script):
 
 
 def stage_configuration(name):
-    return configuration(*pipeline.STAGES[name].sections)
+    return configuration(*composition.STAGES[name].sections)
 
 
 def refuse_without_truth(name, wildcards):
@@ -61,8 +62,8 @@ def if_made(name, files):
 
 
 def stage_sources(name):
-    # The pipeline binds the configuration to the stage; what else it imports is not run.
-    library = sources_of(*pipeline.STAGES[name].modules, script="stage")
+    # The engine hands the stage its part of the configuration; what else it imports is not run.
+    library = sources_of(composition.STAGES[name].module, script="stage")
     return if_made(name, [*library, os.path.relpath(pipeline.__file__)])
 
 
@@ -71,8 +72,22 @@ def product_files(*names):
 
 
 def own_heights():
-    """The heights of the user's own, if the terrain is made of them."""
+    """The heights from a file, if the terrain is made of them."""
     return product_files(*{"elevation"}.intersection(pipeline.from_files(STUDY)))
+
+
+def stage_inputs(name):
+    stage = composition.STAGES[name]
+    given = [other for other in stage.optional if other in pipeline.from_files(STUDY)]
+    return product_files(*stage.inputs, *given)
+
+
+def sources_of_chain(*products, script, library):
+    """The files that take a study through the chain to some products."""
+    stages = pipeline.needed(products).values()
+    return sources_of(
+        *library, *sorted({stage.module for stage in stages}), script=script
+    )
 
 
 def sweep_files(*names):
@@ -126,9 +141,17 @@ def checked_sweep(name):
     """A sweep, all of whose cases are valid: nothing runs if one is not."""
     try:
         sweep.studies(STUDY, name)
-    except validation.ConfigurationError as error:
+    except ConfigurationError as error:
         raise WorkflowError(str(error)) from None
     return STUDY.sweeps[name].model_dump(mode="json")
+
+
+def sweep_sources(wildcards):
+    if "accuracy" not in STAGES:
+        refuse_without_truth("sweep", wildcards)
+    return sources_of_chain(
+        *sweep.results(STUDY, wildcards.sweep), script="sweep", library=["sweeps.sweep"]
+    )
 
 
 def sweep_configuration(wildcards):

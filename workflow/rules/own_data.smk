@@ -16,7 +16,7 @@ if "elevation" in pipeline.from_files(STUDY):
             configuration=configuration(
                 "measurement",
                 "radar.rail_height_m",
-                *[f"scene.{key}" for key in vinsar_config.ELEVATION],
+                *[f"scene.{key}" for key in ELEVATION],
             ),
         script:
             "../scripts/ingest.py"

@@ -1,4 +1,48 @@
-# The paper's claims against this study's figures, and the study's report.
+# The study's numbers, the paper's claims against them, and its report.
+
+
+rule accuracy_summary:
+    input:
+        accuracy="<results>/accuracy.nc",
+        code=sources_of("evaluation.accuracy", script="accuracy_summary"),
+    output:
+        report(
+            "<results>/accuracy.json",
+            caption="../report/caption.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/accuracy_summary.log",
+    benchmark:
+        "<benchmarks>/accuracy_summary.tsv"
+    params:
+        configuration=configuration(),
+        caption="Statistics of the height error in metres, for the whole scene, visible ground and "
+        "shadow.",
+    script:
+        "../scripts/accuracy_summary.py"
+
+
+rule detection_summary:
+    input:
+        **sweep_files(detection_accuracy.SWEEP),
+        code=sources_of("evaluation.detection_accuracy", script="detection_summary"),
+    output:
+        report(
+            "<results>/detection.md",
+            caption="../report/caption.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/detection_summary.log",
+    benchmark:
+        "<benchmarks>/detection_summary.tsv"
+    params:
+        configuration=configuration("scene", "detection", "sweeps"),
+        caption="How many obstacles and holes are found, false alarms of the heights and of the "
+        "image alone, and what is unknown.",
+    script:
+        "../scripts/detection_summary.py"
 
 
 rule claims:
@@ -27,7 +71,12 @@ rule claims:
 rule variants:
     input:
         **own_heights(),
-        code=if_made("accuracy", sources_of("sweeps.variants", script="variants")),
+        code=if_made(
+            "accuracy",
+            sources_of_chain(
+                "accuracy", script="variants", library=["sweeps.variants"]
+            ),
+        ),
     output:
         report(
             "<results>/variants.md",

@@ -5,7 +5,7 @@ import re
 rule sweep:
     input:
         **own_heights(),
-        code=if_made("accuracy", sources_of("sweeps.sweep", script="sweep")),
+        code=sweep_sources,
     output:
         "<results>/sweeps/{sweep}.nc",
     log:

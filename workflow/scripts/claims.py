@@ -6,10 +6,10 @@ from job import job, read_products
 
 from vinsar.paper import claims
 from vinsar.results import storage
-from vinsar.study import config
+from vinsar.study.composition import StudyModel
 
 with job(snakemake):
-    study = config.Study.part(snakemake.params.configuration)
+    study = StudyModel.part(snakemake.params.configuration)
     found = claims.evaluate(read_products(snakemake), study)
     with storage.atomic(snakemake.output.json) as path:
         path.write_text(json.dumps(claims.as_json(found), indent=2) + "\n")

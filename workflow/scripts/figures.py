@@ -5,10 +5,10 @@ from pathlib import Path
 from job import attributes, job, read_products
 
 from vinsar import figures
-from vinsar.study import config
+from vinsar.study.composition import StudyModel
 
 with job(snakemake):
-    study = config.Study.part(snakemake.params.configuration)
+    study = StudyModel.part(snakemake.params.configuration)
     products = read_products(snakemake)
     for name in dict.fromkeys(Path(path).stem for path in snakemake.output):
         figures.save(

@@ -5,10 +5,11 @@ from pathlib import Path
 from job import attributes, job, stage_of
 
 from vinsar.results import storage
-from vinsar.study import config, ingest
+from vinsar.study import ingest
+from vinsar.study.composition import StudyModel
 
 with job(snakemake):
-    study = config.Study.part(snakemake.params.configuration)
+    study = StudyModel.part(snakemake.params.configuration)
     products = ingest.read(study)
     for path in snakemake.output:
         name = Path(path).stem

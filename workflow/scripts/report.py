@@ -8,7 +8,7 @@ from job import attributes, job, product_paths
 
 from vinsar import report
 from vinsar.results import lineage, storage
-from vinsar.study import config
+from vinsar.study.composition import StudyModel
 
 
 def sources():
@@ -23,7 +23,7 @@ def sources():
     claims = paths.get("claims.json")
     texts = {Path(path).name: Path(path) for path in snakemake.input.code}
     return report.Sources(
-        study=config.Study.part(snakemake.params.configuration),
+        study=StudyModel.part(snakemake.params.configuration),
         paper=yaml.safe_load(texts["paper.yaml"].read_text(encoding="utf-8")),
         products=products,
         figures=tuple(figures),

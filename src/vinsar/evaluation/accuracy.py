@@ -7,11 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import REGIONS
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.simulation.visibility import SHADOW
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 _STATISTICS = (
     "mean",
@@ -21,6 +28,40 @@ _STATISTICS = (
     "percentile_95_absolute",
     "maximum_absolute",
 )
+
+
+VARIABLES = {
+    "height_error": Variable(GRID, "real", "m", "height error, reconstructed minus true"),
+    "shadow": SHADOW,
+    "mean": Variable(("region",), "real", "m", "mean height error"),
+    "std": Variable(("region",), "real", "m", "standard deviation of the height error"),
+    "median": Variable(("region",), "real", "m", "median height error"),
+    "mad": Variable(("region",), "real", "m", "median absolute deviation of the height error"),
+    "percentile_95_absolute": Variable(
+        ("region",), "real", "m", "95th percentile of the absolute height error"
+    ),
+    "maximum_absolute": Variable(("region",), "real", "m", "largest absolute height error"),
+    "fraction_within_tolerance": Variable(
+        ("region",),
+        "real",
+        "1",
+        "share of the region's cells with an error within the tolerance",
+    ),
+    "fraction_reconstructed": Variable(
+        ("region",), "real", "1", "share of the region's cells that have a height"
+    ),
+    "cell_count": Variable(("region",), "integer", "1", "number of cells in the region"),
+    "tolerance": Variable((), "real", "m", "height error that counts as within"),
+}
+"""Variables of the product ``accuracy``."""
+
+variables.declare("accuracy", VARIABLES)
+
+
+class Accuracy(Section, name="accuracy"):
+    """What the height errors are held against."""
+
+    tolerance_m: float = key("height error that counts as within", "section 2.3", gt=0)
 
 
 def statistics(error: NDArray[np.floating], tolerance_m: float) -> dict[str, float]:
@@ -129,3 +170,12 @@ def summary(accuracy: xr.Dataset) -> dict[str, Any]:
 
 def _number(value: xr.DataArray) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def _accuracy(products: Products, study: Study) -> xr.Dataset:
+    return evaluate(products["dem"], products["truth"], tolerance_m=study.accuracy.tolerance_m)
+
+
+STAGES = {
+    "accuracy": Stage(_accuracy, inputs=("dem", "truth"), sections=("accuracy",)),
+}

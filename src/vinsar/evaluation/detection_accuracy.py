@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import variables
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import Variable
 from vinsar.processing.detection import FREE, UNKNOWN, regions
 from vinsar.simulation import scene
 
@@ -17,7 +19,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.processing.detection import Detection
+    from vinsar.simulation.scene import SceneObject
 
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
@@ -38,12 +43,71 @@ SWEEP = "roughness"
 _SLACK_M = 1e-9
 
 
+_OBJECT = ("object",)
+
+VARIABLES = {
+    "object_x": Variable(_OBJECT, "real", "m", "centre of the object along x"),
+    "object_y": Variable(_OBJECT, "real", "m", "centre of the object along y"),
+    "object_height": Variable(
+        _OBJECT, "real", "m", "height of the object", "negative for a ditch or pit"
+    ),
+    "height_found": Variable(
+        ("height_threshold", "object"),
+        "flag",
+        "1",
+        "object found by the height detector",
+        flag_meanings="missed found",
+    ),
+    "height_false_alarms": Variable(
+        ("height_threshold",), "integer", "1", "false alarms of the height detector"
+    ),
+    "amplitude_found": Variable(
+        ("amplitude_threshold", "object"),
+        "flag",
+        "1",
+        "object found by the 2-D detector",
+        flag_meanings="missed found",
+    ),
+    "amplitude_false_alarms": Variable(
+        ("amplitude_threshold",), "integer", "1", "false alarms of the 2-D detector"
+    ),
+    "object_unknown": Variable(
+        _OBJECT, "real", "1", "share of the object's ground that the map has as unknown"
+    ),
+    "object_free": Variable(
+        _OBJECT, "real", "1", "share of the object's ground that the map has as free"
+    ),
+    "shadow_unknown": Variable(
+        (), "real", "1", "share of the true shadow that the map has as unknown"
+    ),
+    "visible_unknown": Variable(
+        (), "real", "1", "share of visible ground beside objects that the map has as unknown"
+    ),
+    "scene_area": Variable((), "real", "m2", "area of the map"),
+}
+"""Variables of the product ``detection_accuracy``."""
+
+variables.declare(
+    "detection_accuracy",
+    VARIABLES,
+    coordinates={
+        "object": Variable(("object",), "integer", "1", "number of the object of the scene"),
+        "height_threshold": Variable(
+            ("height_threshold",), "real", "m", "threshold of the height detector"
+        ),
+        "amplitude_threshold": Variable(
+            ("amplitude_threshold",), "real", "1", "threshold of the 2-D detector, a power ratio"
+        ),
+    },
+)
+
+
 def evaluate(
     detections: xr.Dataset,
     truth: xr.Dataset,
-    objects: Sequence[config.SceneObject],
+    objects: Sequence[SceneObject],
     *,
-    options: config.Detection,
+    options: Detection,
 ) -> xr.Dataset:
     """Count found objects and false alarms over the thresholds of both detectors.
 
@@ -110,7 +174,7 @@ def evaluate(
     )
 
 
-def _footprint(part: config.SceneObject, x: Floats, y: Floats) -> Flags:
+def _footprint(part: SceneObject, x: Floats, y: Floats) -> Flags:
     mask = scene.relief(part, x[None, :], y[:, None]) != 0
     # The cell of its centre, at least.
     mask[np.abs(y - part.y_m).argmin(), np.abs(x - part.x_m).argmin()] = True
@@ -123,7 +187,7 @@ def _grow(mask: Flags, cells: int) -> Flags:
     return np.asarray(binary_dilation(mask, np.ones((2 * cells + 1, 2 * cells + 1), bool)))
 
 
-def _height(part: config.SceneObject) -> float:
+def _height(part: SceneObject) -> float:
     return -part.depth_m if part.shape == "ditch" or part.shape == "pit" else part.height_m
 
 
@@ -188,9 +252,7 @@ def curves(case: xr.Dataset, least_height_m: float) -> dict[str, Curve]:
     return result
 
 
-def as_markdown(
-    sweep: xr.Dataset, objects: Sequence[config.SceneObject], options: config.Detection
-) -> str:
+def as_markdown(sweep: xr.Dataset, objects: Sequence[SceneObject], options: Detection) -> str:
     """Return what a sweep over a scene with objects found, as tables in Markdown.
 
     Parameters
@@ -272,3 +334,19 @@ def _decibels(threshold: float) -> str:
 def _reached(curve: Curve, write: Callable[[float], str]) -> str:
     point = curve.at(WANTED)
     return "not reached" if point is None else f"{point[1]:.2g} at {write(point[0])}"
+
+
+def _detection_accuracy(products: Products, study: Study) -> xr.Dataset:
+    return evaluate(
+        products["detections"],
+        products["truth"],
+        study.scene.objects,
+        options=study.detection,
+    )
+
+
+STAGES = {
+    "detection_accuracy": Stage(
+        _detection_accuracy, inputs=("detections", "truth"), sections=("scene.objects", "detection")
+    ),
+}

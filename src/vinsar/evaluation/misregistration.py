@@ -11,19 +11,109 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import variables
-from vinsar.radar import aperture, formulas, waveform
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import Variable
+from vinsar.processing import focusing
+from vinsar.radar import aperture, formulas, grid, trajectory, waveform
+from vinsar.simulation import echo
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
     Focus = Callable[[Floats, Floats], NDArray[np.complexfloating]]
     PointImager = Callable[[Floats], Focus]
 
 _REFINEMENTS = 3
+
+
+# Slant range around a point target that its image may need.
+_POINT_MARGIN_M = 1.5
+
+_SHIFT = ("ground_axis", "target", "target_height")
+
+variables.declare(
+    "registration",
+    {
+        "radial": Variable(
+            _SHIFT, "real", "m", "registration error, radial shift (Eqs. 6-7)", "lower minus upper"
+        ),
+        "equal_path": Variable(
+            _SHIFT,
+            "real",
+            "m",
+            "registration error, points of equal path and slope",
+            "lower minus upper; a circle around a rail, an ellipse otherwise",
+        ),
+        "measured": Variable(
+            _SHIFT,
+            "real",
+            "m",
+            "registration error measured on imaged point targets",
+            "lower minus upper",
+        ),
+        "image_shift": Variable(
+            ("channel", "ground_axis", "target", "target_height"),
+            "real",
+            "m",
+            "measured displacement of the imaged point target from its position",
+        ),
+        "target_position": Variable(
+            ("target", "ground_axis"), "real", "m", "position of the target on the ground"
+        ),
+        "resolution": Variable(
+            ("ground_axis", "target"), "real", "m", "resolution on the ground at the target"
+        ),
+        "map_radial": Variable(
+            ("ground_axis", "y", "x"),
+            "real",
+            "m",
+            "registration error over the scene, radial shift (Eqs. 6-7)",
+            "lower minus upper",
+        ),
+        "map_equal_path": Variable(
+            ("ground_axis", "y", "x"),
+            "real",
+            "m",
+            "registration error over the scene, points of equal path and slope",
+            "lower minus upper",
+        ),
+        "map_resolution": Variable(
+            ("ground_axis", "y", "x"), "real", "m", "resolution on the ground over the scene"
+        ),
+        "map_height": Variable((), "real", "m", "target height of the maps"),
+    },
+    coordinates={
+        "target": Variable(("target",), "label", "", "point target"),
+        "target_height": Variable(("target_height",), "real", "m", "height of the point target"),
+    },
+)
+
+
+class Target(Section):
+    """A point target of the registration analysis."""
+
+    x_m: float = key("position along the rail", "section 1.3")
+    y_m: float = key("position ahead", "section 1.3", gt=0)
+
+
+class Registration(Section, name="registration"):
+    """The analysis of image shifts without registration (Fig. 2)."""
+
+    near: Target = key("the near target", "section 1.3")
+    far: Target = key("the far target", "section 1.3")
+    height_min_m: float = key("lowest target height", "Fig. 2, without a figure")
+    height_max_m: float = key("highest target height", "Fig. 2, without a figure")
+    height_count: int = key("number of target heights", "Fig. 2, without a figure", ge=3)
+    map_height_m: float = key("target height of the map over the scene", "not given")
 
 
 def peak(values: NDArray[np.complexfloating], x: Floats, y: Floats) -> tuple[float, float]:
@@ -182,3 +272,68 @@ def _difference(
 ) -> Floats:
     shifts = [np.stack(np.broadcast_arrays(*formula(part, x, y, height))) for part in apertures]
     return np.asarray(shifts[0] - shifts[1])
+
+
+def _registration(products: Products, study: Study) -> xr.Dataset:
+    antennas = products["trajectory"]
+    frequency = waveform.sampled(study.radar)
+    options = study.registration
+
+    def image_point(target: Floats) -> Focus:
+        point = variables.dataset(
+            "facets", {"facet_position": target[None, :], "reflectivity": np.ones(1)}
+        )
+        near, far = trajectory.range_extent(antennas, target[:1], target[1:2], target[2])
+        profiles = focusing.compress(
+            echo.simulate(point, antennas, frequency=frequency, accuracy_db=None),
+            near_range_m=max(0.0, near - _POINT_MARGIN_M),
+            far_range_m=far + _POINT_MARGIN_M,
+            window=study.imaging.range_window,
+            oversampling=study.imaging.oversampling,
+            interpolation=study.imaging.interpolation,
+        )
+
+        def focus(x: Floats, y: Floats) -> NDArray[np.complexfloating]:
+            images = focusing.backproject(
+                profiles, antennas, x=x, y=y, window=study.imaging.aperture_window
+            )
+            return np.asarray(images["image"].values)
+
+        return focus
+
+    x, y = grid.image_axes(study.imaging)
+    return analyze(
+        trajectory.apertures(antennas),
+        image_point,
+        targets={
+            "near": (options.near.x_m, options.near.y_m),
+            "far": (options.far.x_m, options.far.y_m),
+        },
+        heights=np.linspace(options.height_min_m, options.height_max_m, options.height_count),
+        x=x,
+        y=y,
+        map_height_m=options.map_height_m,
+        frequency=frequency,
+    )
+
+
+def _heights_rise(registration: Registration) -> Iterator[Fault]:
+    if registration.height_min_m >= registration.height_max_m:
+        yield Fault(
+            "registration.height_max_m",
+            registration.height_max_m,
+            f"must exceed registration.height_min_m, {registration.height_min_m}",
+        )
+
+
+STAGES = {
+    "registration": Stage(
+        _registration,
+        inputs=("trajectory",),
+        sections=(*waveform.KEYS, "imaging", "registration"),
+        parallel=True,
+    ),
+}
+
+
+CHECKS = (_heights_rise,)

@@ -16,12 +16,13 @@ from vinsar.figures.drawing.declaration import Figure
 from vinsar.figures.drawing.files import save
 from vinsar.figures.drawing.style import colormap
 from vinsar.figures.drawing.thumbnails import Thumbnail
-from vinsar.study import validation
+from vinsar.foundations.errors import ConfigurationError, Fault
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+
 
 __all__ = ["FIGURES", "MODULES", "THUMBNAILS", "Figure", "Thumbnail", "check", "colormap", "save"]
 
@@ -55,7 +56,7 @@ def _discover() -> None:
 _discover()
 
 
-def check(study: config.Study, products: Collection[str]) -> None:
+def check(study: Study, products: Collection[str]) -> None:
     """Refuse a study that asks for figures that do not exist or cannot be drawn.
 
     Parameters
@@ -83,18 +84,18 @@ def check(study: config.Study, products: Collection[str]) -> None:
     for number, name in enumerate(asked):
         where = f"outputs.figures[{number}]"
         if name not in FIGURES:
-            faults.append(validation.Fault(where, name, f"no such figure; {', '.join(FIGURES)}"))
+            faults.append(Fault(where, name, f"no such figure; {', '.join(FIGURES)}"))
             continue
         if name in asked[:number]:
-            faults.append(validation.Fault(where, name, "is listed twice"))
+            faults.append(Fault(where, name, "is listed twice"))
         if name not in possible:
             allowed = f"needs the true scene, without which there are {', '.join(possible)}"
-            faults.append(validation.Fault(where, name, allowed))
+            faults.append(Fault(where, name, allowed))
             continue
         faults += [
-            validation.Fault(where, name, f"shows the sweep '{sweep}', which `sweeps` lacks")
+            Fault(where, name, f"shows the sweep '{sweep}', which `sweeps` lacks")
             for sweep in FIGURES[name].sweeps
             if sweep not in study.sweeps
         ]
     if faults:
-        raise validation.ConfigurationError(faults)
+        raise ConfigurationError(faults)

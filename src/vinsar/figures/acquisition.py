@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from matplotlib.patches import Rectangle
     from numpy.typing import NDArray
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.processing.focusing import Imaging
+    from vinsar.simulation.scene import Scene
+    from vinsar.study.options import Figures
 
 _GROUND, _SCENE, _VEHICLE = "#b8a98f", "#9fc2a2", "#dfe2e5"
 _DIMENSION = {
@@ -79,7 +82,7 @@ class Layout:
         return float(geometry.look_angle((self.aside, *self.lower), 0, *self.target))
 
 
-def layout(study: config.Study) -> Layout:
+def layout(study: Study) -> Layout:
     """Return the geometry of a study, with the target on a top in the middle of its scene.
 
     Parameters
@@ -116,7 +119,7 @@ def layout(study: config.Study) -> Layout:
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw Fig. 1.
 
     Parameters
@@ -145,7 +148,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     return figure
 
 
-def _side_limits(scheme: Layout, study: config.Study) -> tuple[float, float, float, float]:
+def _side_limits(scheme: Layout, study: Study) -> tuple[float, float, float, float]:
     far = 1.02 * max(study.scene.y_max_m, study.imaging.y_max_m)
     near = min(-1.5 * study.radar.rail_height_m, -0.12 * far, _zoom_limits(scheme)[0])
     # What is written beside the target takes a seventh of the width at its right.
@@ -155,7 +158,7 @@ def _side_limits(scheme: Layout, study: config.Study) -> tuple[float, float, flo
 
 
 def _side(
-    axes: Axes, scheme: Layout, study: config.Study, view: tuple[float, float, float, float]
+    axes: Axes, scheme: Layout, study: Study, view: tuple[float, float, float, float]
 ) -> None:
     from matplotlib.patches import Arc, Rectangle
 
@@ -361,7 +364,7 @@ def _near_antennas(axes: Axes, scheme: Layout) -> None:
     axes.set_title("(b) the antennas, to scale")
 
 
-def values(study: config.Study) -> list[tuple[str, str]]:
+def values(study: Study) -> list[tuple[str, str]]:
     """Return the quantities that Fig. 1 lists, as symbol or name and value.
 
     Parameters
@@ -417,7 +420,7 @@ def _signed(value: float, form: str, unit: str) -> str:
     return f"{value:{form}} {unit}".replace("-", "−")
 
 
-def _values(axes: Axes, study: config.Study) -> None:
+def _values(axes: Axes, study: Study) -> None:
     rows = values(study)
     axes.set_axis_off()
     axes.set_xlim(0, 1)
@@ -431,7 +434,7 @@ def _values(axes: Axes, study: config.Study) -> None:
             axes.text(0, row + 0.2, "At the target T", va="center", fontsize=style.points(8))
 
 
-def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None:
+def _plan(axes: Axes, scheme: Layout, study: Study, shape: float) -> None:
     """Draw the plan; `shape` is the axes' height over width."""
     from matplotlib.patches import Rectangle
 
@@ -493,7 +496,7 @@ def _plan(axes: Axes, scheme: Layout, study: config.Study, shape: float) -> None
     axes.set_title("(c) plan, to scale")
 
 
-def _area(area: config.Scene | config.Imaging, **look: Any) -> Rectangle:
+def _area(area: Scene | Imaging, **look: Any) -> Rectangle:
     from matplotlib.patches import Rectangle
 
     return Rectangle(
@@ -504,7 +507,7 @@ def _area(area: config.Scene | config.Imaging, **look: Any) -> Rectangle:
     )
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the ranges and angles that Fig. 1 draws, as a sentence."""
     del products
     scheme = layout(study)
@@ -515,7 +518,7 @@ def numbers(products: Products, study: config.Study) -> str:
     )
 
 
-def _positions(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _positions(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     for channel, colour in enumerate((style.BLUE, style.ORANGE)):
         for name, marker in (("receiver", "."), ("transmitter", "+")):
@@ -524,7 +527,7 @@ def _positions(axes: Axes, product: xr.Dataset, options: config.Figures) -> None
     axes.margins(0.1, 0.6)
 
 
-def _visible(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _visible(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     axes.imshow(
         product["visible"].values[0], cmap="gray", aspect="auto", interpolation="antialiased"

@@ -8,7 +8,6 @@ import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps, thumbnails
 from vinsar.radar import geometry, instrument
-from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,13 +15,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.study.options import Figures
 
     Floats = NDArray[np.floating]
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw what errors of the baseline do to the height, by its attitude.
 
     Parameters
@@ -96,7 +97,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     return figure
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the height errors at the study's attitude, and where a length error is harmless."""
     product = products["baseline_angle"]
     beta = np.rad2deg(product["baseline_angle"].values)
@@ -114,7 +115,7 @@ def numbers(products: Products, study: config.Study) -> str:
     )
 
 
-def _sensitivity(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _sensitivity(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     axes.semilogy(product["baseline_angle"].values, product["length_drawn"].values, color=style.INK)
 

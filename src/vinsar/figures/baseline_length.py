@@ -8,8 +8,8 @@ import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.radar import instrument, speckle
-from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
 
@@ -27,7 +28,7 @@ _BEST_COLOUR = "#dcebdd"
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the spread of the height against the length of the baseline.
 
     Parameters
@@ -46,8 +47,8 @@ def draw(products: Products, study: config.Study) -> Figure:
     sweep = variables.swept(products[f"sweeps/{name}"], "radar_baseline_m")
     sweep = sweep.sortby("radar_baseline_m")
     length = sweep["radar_baseline_m"].values
-    radar = config.swept_section(study, name, "radar")
-    place = instrument.middle(config.swept_section(study, name, "scene"))
+    radar = swept_section(study, name, "radar")
+    place = instrument.middle(swept_section(study, name, "scene"))
     quarter = float(instrument.Instrument.planned(radar).critical_baseline(*place)) / 4
     planned = [
         instrument.Instrument.planned(radar.model_copy(update={"baseline_m": float(value)}))
@@ -192,7 +193,7 @@ def _mark(axes: Axes, quarter: float) -> Any:
     )
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the best length of the baseline, as a sentence."""
     del study
     sweep = variables.swept(products["sweeps/baseline_length"], "radar_baseline_m")

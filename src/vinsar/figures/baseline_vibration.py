@@ -8,7 +8,7 @@ import numpy as np
 
 from vinsar.figures.drawing import declaration, maps, style, sweeps
 from vinsar.foundations import variables
-from vinsar.study import config
+from vinsar.foundations.configuration import swept_section
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
 
@@ -25,7 +26,7 @@ _MODES = {"common": "errors common to both antennas", "independent": "independen
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the spread of the height over the length of the baseline and the vibration.
 
     Parameters
@@ -46,7 +47,7 @@ def draw(products: Products, study: config.Study) -> Figure:
         "radar_baseline_m",
         "motion_level_wavelengths",
     ).sortby(["radar_baseline_m", "motion_level_wavelengths"])
-    axis = config.swept_section(study, "baseline_vibration", "motion").axis
+    axis = swept_section(study, "baseline_vibration", "motion").axis
     modes = [mode for mode in _MODES if mode in sweep["motion_channels"].values]
     part = (
         sweep["std"]
@@ -98,7 +99,7 @@ def _heat(axes: Axes, part: xr.DataArray, field: Floats, limits: tuple[float, fl
     return image
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the best case of each kind of error at the highest level, as a sentence."""
     del study
     sweep = variables.swept(

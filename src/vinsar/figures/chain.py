@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.study.options import Figures
 
 _HEIGHT_STEP_M = 0.05
 # Facets along the longer side of the surface; more are too small to tell apart on paper.
@@ -35,7 +36,7 @@ class Panel:
 
     title: str
     product: str
-    layer: Callable[[Products, config.Study], maps.Layer]
+    layer: Callable[[Products, Study], maps.Layer]
 
 
 def height_limits(heights: xr.Dataset, outside_percent: float = 0.0) -> tuple[float, float]:
@@ -63,7 +64,7 @@ def height_limits(heights: xr.Dataset, outside_percent: float = 0.0) -> tuple[fl
     return float(low), float(high)
 
 
-def _height(data: xr.DataArray, products: Products, study: config.Study) -> maps.Layer:
+def _height(data: xr.DataArray, products: Products, study: Study) -> maps.Layer:
     if "truth" in products:
         limits = height_limits(products["truth"])
     else:
@@ -77,22 +78,22 @@ def _height(data: xr.DataArray, products: Products, study: config.Study) -> maps
     )
 
 
-def _true_height(products: Products, study: config.Study) -> maps.Layer:
+def _true_height(products: Products, study: Study) -> maps.Layer:
     return _height(products["truth"]["height"], products, study)
 
 
-def _reconstructed_height(products: Products, study: config.Study) -> maps.Layer:
+def _reconstructed_height(products: Products, study: Study) -> maps.Layer:
     return _height(products["dem"]["height"], products, study)
 
 
-def _reflectivity(products: Products, study: config.Study) -> maps.Layer:
+def _reflectivity(products: Products, study: Study) -> maps.Layer:
     del study
     data = products["truth"]["reflectivity"]
     top = float(np.nanmax(data.values))
     return maps.Layer(data, style.colormap("magma"), (0.0, top or 1.0), "reflectivity")
 
 
-def _amplitude(channel: str, products: Products, study: config.Study) -> maps.Layer:
+def _amplitude(channel: str, products: Products, study: Study) -> maps.Layer:
     amplitude = abs(products["images"]["image"])
     # One reference for both channels, so that their grey levels compare.
     top = max(float(amplitude.max()), np.finfo(np.float32).tiny)
@@ -104,7 +105,7 @@ def _amplitude(channel: str, products: Products, study: config.Study) -> maps.La
     )
 
 
-def _wrapped_phase(product: str, products: Products, study: config.Study) -> maps.Layer:
+def _wrapped_phase(product: str, products: Products, study: Study) -> maps.Layer:
     field = products[product]["interferogram"]
     return maps.Layer(
         field.copy(data=np.angle(field.values)),
@@ -115,7 +116,7 @@ def _wrapped_phase(product: str, products: Products, study: config.Study) -> map
     )
 
 
-def _unwrapped_phase(products: Products, study: config.Study) -> maps.Layer:
+def _unwrapped_phase(products: Products, study: Study) -> maps.Layer:
     del study
     data = products["unwrapped"]["phase"]
     known = data.values[np.isfinite(data.values)]
@@ -159,7 +160,7 @@ SHEET_INPUTS: tuple[str, ...] = tuple(
 
 
 @style.styled
-def draw_sheet(products: Products, study: config.Study) -> Figure:
+def draw_sheet(products: Products, study: Study) -> Figure:
     """Draw Fig. 3 as one sheet.
 
     Parameters
@@ -208,7 +209,7 @@ def draw_sheet(products: Products, study: config.Study) -> Figure:
 
 
 @style.styled
-def draw_single(letter: str, products: Products, study: config.Study) -> Figure:
+def draw_single(letter: str, products: Products, study: Study) -> Figure:
     """Draw one panel of Fig. 3 as a figure of its own.
 
     Parameters
@@ -247,7 +248,7 @@ def _map(
     box: tuple[float, float, float, float],
     letter: str,
     products: Products,
-    study: config.Study,
+    study: Study,
     *,
     prefix: str = "",
     label_x: bool = True,
@@ -264,7 +265,7 @@ def _surface(
     figure: Figure,
     box: tuple[float, float, float, float],
     products: Products,
-    study: config.Study,
+    study: Study,
     prefix: str,
 ) -> None:
     """Draw the true terrain as a surface, seen from the vehicle's side of the scene."""
@@ -320,7 +321,7 @@ def _surface(
     style.write_title(figure, box[0], box[1] + box[3], title)
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the share of shadow and the number of residues, as a sentence."""
     del study
     shadow = 100 * float(products["truth"]["shadow"].mean())
@@ -328,11 +329,11 @@ def numbers(products: Products, study: config.Study) -> str:
     return f"{shadow:.1f} % of the cells are in shadow; the filtered phase has {residues} residues."
 
 
-def _heights(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _heights(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     thumbnails.heights(axes, product["height"], options)
 
 
-def _facets(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _facets(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     x, y, _ = product["facet_position"].values.T
     colours = product["reflectivity"].values
@@ -343,22 +344,22 @@ def _facets(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
     axes.set_ylim(y.min(), y.max())
 
 
-def _shadow(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _shadow(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     thumbnails.raster(axes, product["visible_fraction"].mean("channel"), "gray", 0, 1)
 
 
-def _image(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _image(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     low = -options.amplitude_range_db
     axes.imshow(thumbnails.decibels(product["image"].values[0]), cmap="gray", vmin=low, vmax=0)
 
 
-def _phase(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _phase(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     angle = product["interferogram"].copy(data=np.angle(product["interferogram"].values))
     thumbnails.raster(axes, angle, style.colormap(options.phase_colormap), -np.pi, np.pi)
 
 
-def _unwrapped(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _unwrapped(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     low, high = thumbnails.ends(product["phase"].values)
     thumbnails.raster(axes, product["phase"], style.colormap("viridis_r"), low, high)

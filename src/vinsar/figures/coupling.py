@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.study.options import Figures
 
     Floats = NDArray[np.floating]
 
@@ -36,7 +37,7 @@ _MATRIX_DB = 40.0
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the coupling and its suppression.
 
     Parameters
@@ -152,10 +153,10 @@ def _cost(axes: Axes, data: xr.Dataset) -> None:
     axes.legend(loc="lower right")
 
 
-def _matrix(name: str) -> Callable[[Axes, xr.Dataset, config.Figures], None]:
+def _matrix(name: str) -> Callable[[Axes, xr.Dataset, Figures], None]:
     """Return what draws the lower channel's positions against frequency or range."""
 
-    def draw_matrix(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+    def draw_matrix(axes: Axes, product: xr.Dataset, options: Figures) -> None:
         del options
         values = thumbnails.decibels(product[name].values[0])
         axes.imshow(values, cmap="gray", aspect="auto", vmin=-_MATRIX_DB, vmax=0)
@@ -163,7 +164,7 @@ def _matrix(name: str) -> Callable[[Axes, xr.Dataset, config.Figures], None]:
     return draw_matrix
 
 
-def _power(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _power(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     power = product["power"].values.reshape(-1, product.sizes["slant_range"])
     axes.semilogy(product["slant_range"].values, power.T, color=style.INK, linewidth=0.6)

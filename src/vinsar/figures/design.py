@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps
+from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
-from vinsar.study import config
+from vinsar.study.composition import StudyModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
 
@@ -33,7 +34,7 @@ _LEFTS, _BOTTOMS, _WIDTH, _TALL = (13.0, 105.0), (75.0, 12.0), 71.0, 46.0
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw what a configuration will do, without having run it.
 
     Parameters
@@ -154,7 +155,7 @@ def _limit(axes: Axes, sheet: design.Sheet) -> float:
 def changed(parts: dict[str, Any], **changes: dict[str, Any]) -> design.Sheet:
     """Return the design sheet of some sections of a study, with other values in some of them."""
     changed = {name: parts[name].model_copy(update=values) for name, values in changes.items()}
-    return design.Sheet(config.Study.model_construct(**(parts | changed)))
+    return design.Sheet(StudyModel.model_construct(**(parts | changed)))
 
 
 FIGURES = {

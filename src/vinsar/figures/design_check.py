@@ -9,21 +9,22 @@ import numpy as np
 from vinsar.figures.design import OF_AXES, changed
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.foundations.constants import AXES
 from vinsar.prediction import design
-from vinsar.study import config
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the height noise that sweeps measured against what was predicted.
 
     Parameters
@@ -79,8 +80,8 @@ def draw(products: Products, study: config.Study) -> Figure:
     return figure
 
 
-def _sheet(study: config.Study, sweep: str, **changes: dict[str, Any]) -> design.Sheet:
-    parts = {name: config.swept_section(study, sweep, name) for name in design.SECTIONS}
+def _sheet(study: Study, sweep: str, **changes: dict[str, Any]) -> design.Sheet:
+    parts = {name: swept_section(study, sweep, name) for name in design.SECTIONS}
     return changed(parts, **changes)
 
 
@@ -89,14 +90,14 @@ def _spread(sweep: Any) -> Floats:
     return np.asarray(sweeps.NORMAL * measured.values)
 
 
-def _by_noise(products: Products, study: config.Study) -> tuple[Floats, Floats]:
+def _by_noise(products: Products, study: Study) -> tuple[Floats, Floats]:
     sweep = variables.swept(products["sweeps/snr"], "echo_snr_db")
     levels = [None if np.isnan(v) else float(v) for v in sweep["echo_snr_db"].values]
     predicted = [_sheet(study, "snr", echo={"snr_db": v}).scene_height_std() for v in levels]
     return np.array(predicted), _spread(sweep)
 
 
-def _by_baseline(products: Products, study: config.Study) -> tuple[Floats, Floats]:
+def _by_baseline(products: Products, study: Study) -> tuple[Floats, Floats]:
     sweep = variables.swept(products["sweeps/baseline_length"], "radar_baseline_m")
     predicted = [
         _sheet(study, "baseline_length", radar={"baseline_m": float(length)}).scene_height_std()
@@ -105,9 +106,7 @@ def _by_baseline(products: Products, study: config.Study) -> tuple[Floats, Float
     return np.array(predicted), _spread(sweep)
 
 
-def _by_errors(
-    products: Products, study: config.Study
-) -> list[tuple[str, tuple[Floats, Floats], str]]:
+def _by_errors(products: Products, study: Study) -> list[tuple[str, tuple[Floats, Floats], str]]:
     keys = ("motion_channels", "motion_axis", "motion_level_wavelengths")
     sweep = variables.swept(products["sweeps/vibration"], *keys)
     sheet = _sheet(study, "vibration")

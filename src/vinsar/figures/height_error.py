@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.study.options import Figures
 
 _REGIONS = {"whole_scene": "whole scene", "visible_ground": "visible ground", "shadow": "shadow"}
 _BINS_PER_TOLERANCE = 10
@@ -24,7 +25,7 @@ _HISTOGRAM_TOLERANCES = 20
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw Fig. 4.
 
     Parameters
@@ -217,7 +218,7 @@ def _table(axes: Axes, accuracy: xr.Dataset) -> None:
         axes.plot([0, 1], [level, level], color=style.INK, linewidth=0.5, clip_on=False)
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the statistics of the height error, as a sentence."""
     del study
     accuracy = products["accuracy"]
@@ -232,7 +233,7 @@ def numbers(products: Products, study: config.Study) -> str:
     )
 
 
-def _error(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _error(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     limit = 3 * float(product["tolerance"])
     thumbnails.raster(axes, product["height_error"], style.colormap("cmc.vik"), -limit, limit)

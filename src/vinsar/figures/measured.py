@@ -10,13 +10,13 @@ from vinsar.figures.drawing import declaration, maps, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 _TITLE_MM = 7.0
 
 
-def _coherence(products: Products, study: config.Study) -> maps.Layer:
+def _coherence(products: Products, study: Study) -> maps.Layer:
     del study
     return maps.Layer(
         products["interferogram"]["coherence"], style.colormap("gray"), (0.0, 1.0), "coherence"
@@ -35,7 +35,7 @@ INPUTS: tuple[str, ...] = tuple(dict.fromkeys(panel.product for panel in _SHOWN)
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the chain from the images to the height, without any truth.
 
     Parameters

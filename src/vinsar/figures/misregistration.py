@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.study.options import Figures
 
 # A tenth of a resolution cell is what the paper allows without registration (section 1.3).
 _ALLOWED_SHARE = 0.1
@@ -22,7 +23,7 @@ _HEIGHT_MM = 88.0
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw Fig. 2.
 
     Parameters
@@ -150,7 +151,7 @@ def _map(figure: Figure, registration: xr.Dataset, curve: str) -> None:
         bar.ax.axhline(1, color="black", linewidth=0.8)
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the largest errors that imaged point targets measure, as a sentence."""
     del study
     product = products["registration"]
@@ -168,7 +169,7 @@ def numbers(products: Products, study: config.Study) -> str:
     return f"Largest errors measured: {'; '.join(parts)}."
 
 
-def _shifts(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _shifts(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     del options
     for target, colour in zip(product["target"].values, (style.INK, style.BLUE), strict=False):
         part = product["measured"].sel(ground_axis="y", target=target)

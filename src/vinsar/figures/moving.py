@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
 
@@ -40,7 +40,7 @@ _WIDTHS = (27.0, 32.0, 32.0, 36.0)
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the turned aperture, and focus and height against speed and against its error.
 
     Parameters
@@ -126,7 +126,7 @@ def _level(axes: Axes, relief: float) -> Any:
     )
 
 
-def _plan(axes: Axes, study: config.Study, speeds: Floats, durations: list[float]) -> None:
+def _plan(axes: Axes, study: Study, speeds: Floats, durations: list[float]) -> None:
     """Draw apertures, image, and where the image lies uncorrected, seen from above."""
     from matplotlib.patches import Polygon, Rectangle
 
@@ -216,7 +216,7 @@ def predicted_std(
     return float(np.hypot(floor_m, error[inside].std())) if inside.any() else float("nan")
 
 
-def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: config.Study) -> list[Any]:
+def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: Study) -> list[Any]:
     """Draw the spread of the height against the sensor's error; return what errors suffice."""
     from matplotlib.ticker import FixedLocator
     from scipy.stats import norm

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.study.options import Figures
 
 CLASSES = {
     detection.FREE: ("free", "#f2f2ee"),
@@ -30,7 +31,7 @@ _LEAST_RANGE_M = 0.05
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the scene, an image, the reconstructed heights, and the map of what is found.
 
     Parameters
@@ -128,7 +129,7 @@ def _explain(figure: Figure) -> None:
     sweeps.legend(figure, handles, 13.0, 2.0, 4)
 
 
-def _above_ground(axes: Axes, product: xr.Dataset, options: config.Figures) -> None:
+def _above_ground(axes: Axes, product: xr.Dataset, options: Figures) -> None:
     thumbnails.heights(axes, product["height_above_ground"], options)
 
 

@@ -10,15 +10,18 @@ from vinsar.evaluation import detection_accuracy
 from vinsar.figures import obstacles
 from vinsar.figures.drawing import declaration, style, sweeps, thumbnails
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.processing import detection
-from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+    from vinsar.processing.detection import Detection
+    from vinsar.simulation.scene import SceneObject
 
 _HEIGHT = [
     sweeps.Look("", style.BLUE, "-", "o"),
@@ -34,7 +37,7 @@ _DISTANCES = [
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw detection against false alarms, detection against height, and what holes become.
 
     Parameters
@@ -51,7 +54,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     """
     key = "scene_roughness_std_m"
     sweep = variables.swept(products[f"sweeps/{detection_accuracy.SWEEP}"], key).sortby(key)
-    options = config.swept_section(study, detection_accuracy.SWEEP, "detection")
+    options = swept_section(study, detection_accuracy.SWEEP, "detection")
     middle = sweep.isel({key: sweep.sizes[key] // 2})
     sunk = int((middle["object_height"].isel(realization=0) < 0).sum())
     bottom = 30.0 + 5.0 * sunk
@@ -59,12 +62,12 @@ def draw(products: Products, study: config.Study) -> Figure:
     _draw_curves(style.place(figure, 13.0, bottom, 72.0, 63.0), sweep, options)
     _draw_by_height(style.place(figure, 104.0, bottom, 72.0, 63.0), middle, options)
     if sunk:
-        objects = config.swept_section(study, detection_accuracy.SWEEP, "scene").objects
+        objects = swept_section(study, detection_accuracy.SWEEP, "scene").objects
         _draw_holes(style.place(figure, 58.0, 13.0, 118.0, 5.0 * sunk), middle, objects)
     return figure
 
 
-def _draw_curves(axes: Axes, sweep: xr.Dataset, options: config.Detection) -> None:
+def _draw_curves(axes: Axes, sweep: xr.Dataset, options: Detection) -> None:
     key = "scene_roughness_std_m"
     most = 1.0
     for number, look in enumerate(_HEIGHT[: sweep.sizes[key]]):
@@ -106,7 +109,7 @@ def _curve(axes: Axes, curve: detection_accuracy.Curve, look: sweeps.Look, label
     )  # fmt: skip
 
 
-def _draw_by_height(axes: Axes, case: xr.Dataset, options: config.Detection) -> None:
+def _draw_by_height(axes: Axes, case: xr.Dataset, options: Detection) -> None:
     first = case.isel(realization=0)
     height, distance = first["object_height"].values, first["object_y"].values
     at = case["height_found"].sel(height_threshold=options.threshold_m, method="nearest")
@@ -129,7 +132,7 @@ def _draw_by_height(axes: Axes, case: xr.Dataset, options: config.Detection) -> 
         axes.legend(loc="lower right")
 
 
-def _draw_holes(axes: Axes, case: xr.Dataset, objects: tuple[config.SceneObject, ...]) -> None:
+def _draw_holes(axes: Axes, case: xr.Dataset, objects: tuple[SceneObject, ...]) -> None:
     mean = case.mean("realization")
     holes = np.array([n for n, part in enumerate(objects) if hasattr(part, "depth_m")])[::-1]
     unknown, free = (mean[name].values[holes] for name in ("object_unknown", "object_free"))

@@ -8,13 +8,14 @@ import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.radar import instrument, speckle
-from vinsar.study import config
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 _PARTS = (
     ("std", "whole_scene", 1.0, sweeps.WHOLE),
@@ -24,7 +25,7 @@ _PARTS = (
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the spread of the height error against the signal-to-noise ratio.
 
     Parameters
@@ -41,8 +42,8 @@ def draw(products: Products, study: config.Study) -> Figure:
     """
     sweep = variables.swept(products["sweeps/snr"], "echo_snr_db").sortby("echo_snr_db")
     ratio = sweep["echo_snr_db"].values
-    radar = config.swept_section(study, "snr", "radar")
-    place = instrument.middle(config.swept_section(study, "snr", "scene"))
+    radar = swept_section(study, "snr", "radar")
+    place = instrument.middle(swept_section(study, "snr", "scene"))
     planned = instrument.Instrument.planned(radar)
     coherence = speckle.noise_coherence(ratio) * planned.geometric_coherence(*place)
     count = sweeps.looks(study, "snr")
@@ -84,7 +85,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     return figure
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the spread at the lowest and the highest ratio, as a sentence."""
     del study
     sweep = variables.swept(products["sweeps/snr"], "echo_snr_db").sortby("echo_snr_db")

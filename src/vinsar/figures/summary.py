@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 INPUTS = tuple(
     dict.fromkeys((*(name for letter in "acfh" for name in chain.panel_inputs(letter)), "accuracy"))
@@ -34,7 +34,7 @@ _SHOWN = (
 
 
 @style.styled_for_slides(_FONT_SIZE_PT)
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw the front sheet: scene, image, phase, reconstructed height, its error and statistics.
 
     Parameters
@@ -81,7 +81,7 @@ def draw(products: Products, study: config.Study) -> Figure:
     return figure
 
 
-def title(study: config.Study) -> str:
+def title(study: Study) -> str:
     """Return the sheet's title: the radar in a line."""
     radar = study.radar
     return (

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 _REGIONS = (
     ("visible_ground", sweeps.Look("visible ground", style.BLUE, "none", "o")),
@@ -24,7 +24,7 @@ _ROW_MM = 6.5
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw resolution, height of ambiguity, accuracy and scan time of each arrangement.
 
     Parameters

@@ -8,15 +8,16 @@ import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps, thumbnails
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.radar import instrument
-from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 _LOOKS = {
     "x": sweeps.Look("error along x (the rail)", style.BLUE, "-", "o"),
@@ -29,7 +30,7 @@ _LEFTS, _BOTTOM, _WIDTH, _TALL = (12.0, 69.0, 131.0), 21.0, 46.0, 52.0
 
 
 @style.styled
-def draw(products: Products, study: config.Study) -> Figure:
+def draw(products: Products, study: Study) -> Figure:
     """Draw Fig. 5.
 
     Parameters
@@ -49,8 +50,8 @@ def draw(products: Products, study: config.Study) -> Figure:
     )
     deviation = sweep["std"].sel(region="whole_scene")
     relief = float(products["truth"]["height"].std())
-    radar = config.swept_section(study, "vibration", "radar")
-    place = instrument.middle(config.swept_section(study, "vibration", "scene"))
+    radar = swept_section(study, "vibration", "radar")
+    place = instrument.middle(swept_section(study, "vibration", "scene"))
     random = float(instrument.Instrument.planned(radar).random_phase_std(*place))
     figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
     # One scale for both panels: they are to be compared.
@@ -132,7 +133,7 @@ def _focus(axes: Axes, gain: xr.DataArray) -> None:
     _levels(axes, levels)
 
 
-def numbers(products: Products, study: config.Study) -> str:
+def numbers(products: Products, study: Study) -> str:
     """Return the spreads at about a tenth of a wavelength and at the highest level."""
     del study
     sweep = variables.swept(

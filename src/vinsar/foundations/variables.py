@@ -1,6 +1,7 @@
-"""Every variable of every product, declared once: dimensions, type, unit, name, meaning.
+"""Variables of the products: dimensions, type, unit, name, meaning, each declared once.
 
-`dataset` is the one way to make a product; `check` refuses what departs from the declaration.
+A module declares the products that it makes. `dataset` is the one way to make one; `check` refuses
+what departs from the declaration.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
-from vinsar.foundations.constants import AXES, CHANNELS, REGIONS
+from vinsar.foundations.constants import AXES, CHANNELS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
     from xarray.core.indexes import Index
@@ -76,7 +77,8 @@ class Variable:
         return attrs
 
 
-_GRID = ("y", "x")
+GRID: tuple[str, ...] = ("y", "x")
+"""Dimensions of what lies on image or ground."""
 
 COORDINATES: dict[str, Variable] = {
     "channel": Variable(
@@ -92,417 +94,50 @@ COORDINATES: dict[str, Variable] = {
     # Without CF's axis attribute: it would ask for the latitude and longitude of a vehicle's frame.
     "x": Variable(("x",), "real", "m", "x (along the rail)", "positive to the right"),
     "y": Variable(("y",), "real", "m", "y (ahead of the vehicle)"),
-    "facet": Variable(("facet",), "integer", "1", "number of the facet"),
-    "target": Variable(("target",), "label", "", "point target"),
-    "target_height": Variable(("target_height",), "real", "m", "height of the point target"),
     "region": Variable(("region",), "label", "", "part of the scene"),
-    "baseline_angle": Variable(
-        ("baseline_angle",), "real", "radian", "attitude of the baseline from horizontal"
-    ),
-    "detection": Variable(("detection",), "integer", "1", "number of the detected area"),
-    "object": Variable(("object",), "integer", "1", "number of the object of the scene"),
-    "height_threshold": Variable(
-        ("height_threshold",), "real", "m", "threshold of the height detector"
-    ),
-    "amplitude_threshold": Variable(
-        ("amplitude_threshold",), "real", "1", "threshold of the 2-D detector, a power ratio"
-    ),
-    "suppression": Variable(("suppression",), "label", "", "suppression of the coupling"),
-    "weighting": Variable(("weighting",), "label", "", "weighting of the frequencies"),
     "realization": Variable(("realization",), "integer", "1", "number of the realization"),
 }
+"""The dimensions' coordinates; a product declares those that it alone has."""
 
-_ANTENNA = ("channel", "position", "axis")
-_SHIFT = ("ground_axis", "target", "target_height")
+PRODUCTS: dict[str, dict[str, Variable]] = {}
+"""The variables of each product, as the modules declare them."""
 
-_ANTENNAS = {
-    "transmitter": Variable(_ANTENNA, "real", "m", "position of the transmitting antenna"),
-    "receiver": Variable(_ANTENNA, "real", "m", "position of the receiving antenna"),
-}
-_SHADOW = Variable(
-    _GRID,
-    "flag",
-    "1",
-    "cell hidden from either antenna at more than half of the positions",
-    flag_meanings="visible shadow",
-)
-_TERRAIN = {
-    "height": Variable(_GRID, "real", "m", "true height above the ground plane"),
-    "reflectivity": Variable(_GRID, "real", "1", "reflectivity of the scene"),
-}
-_DETECTED, _OBJECT = ("detection",), ("object",)
-_ECHO = {
-    "echo": Variable(
-        ("channel", "position", "frequency"),
-        "complex",
-        "1",
-        "stepped-frequency echo",
-        "a path R out and back gives the phase -2 pi f R / c",
-    ),
-}
+_CHECKS: dict[str, Callable[[xr.Dataset], None]] = {}
 
-PRODUCTS: dict[str, dict[str, Variable]] = {
-    "trajectory": _ANTENNAS,
-    "true_trajectory": _ANTENNAS,
-    "recorded_trajectory": _ANTENNAS,
-    "roughness": {
-        "height": Variable(_GRID, "real", "m", "random roughness of the ground"),
-    },
-    "elevation": _TERRAIN,
-    "terrain": _TERRAIN,
-    "facets": {
-        "facet_position": Variable(("facet", "axis"), "real", "m", "position of the facet"),
-        "reflectivity": Variable(("facet",), "real", "1", "reflectivity of the facet"),
-    },
-    "visibility": {
-        "visible": Variable(
-            ("channel", "position", "facet"),
-            "flag",
-            "1",
-            "facet seen from the transmitter and the receiver (Eq. 8)",
-            flag_meanings="hidden visible",
-        ),
-    },
-    "truth": {
-        "height": Variable(_GRID, "real", "m", "true height on the DEM's grid"),
-        "reflectivity": Variable(_GRID, "real", "1", "reflectivity on the DEM's grid"),
-        "visible_fraction": Variable(
-            ("channel", "y", "x"), "real", "1", "share of the antenna positions that see the cell"
-        ),
-        "shadow": _SHADOW,
-    },
-    "echo": _ECHO,
-    "received": _ECHO,
-    "measurement": _ECHO | _ANTENNAS,
-    "profiles": {
-        "profile": Variable(
-            ("channel", "position", "slant_range"),
-            "complex",
-            "1",
-            "range-compressed profile",
-            "at baseband: the carrier's phase over the slant-range axis is removed; "
-            "a unit point target peaks at 1",
-        ),
-        "carrier_frequency": Variable((), "real", "Hz", "carrier frequency of the profiles"),
-    },
-    "images": {
-        "image": Variable(
-            ("channel", "y", "x"),
-            "complex",
-            "1",
-            "complex image focused on the ground plane",
-            "a unit point target on the ground plane gives amplitude 1 and phase 0",
-        ),
-        "wavelength": Variable((), "real", "m", "wavelength of the carrier"),
-        **_ANTENNAS,
-    },
-    "interferogram": {
-        "interferogram": Variable(
-            _GRID, "complex", "1", "interferogram, lower times conjugate upper (Eq. 10)"
-        ),
-        "coherence": Variable(_GRID, "real", "1", "multilooked coherence magnitude"),
-    },
-    "filtered": {
-        "interferogram": Variable(_GRID, "complex", "1", "filtered interferogram"),
-    },
-    "unwrapped": {
-        "phase": Variable(
-            _GRID,
-            "real",
-            "radian",
-            "unwrapped interferometric phase without the flat-earth phase",
-            "lower minus upper; known up to one constant",
-        ),
-        "residue": Variable(
-            _GRID,
-            "integer",
-            "1",
-            "residue of the filtered phase",
-            "winding number of the four cells whose least x and y are this one's: -1, 0 or 1",
-        ),
-    },
-    "dem": {
-        "height": Variable(_GRID, "real", "m", "reconstructed height above the ground plane"),
-        "image_height": Variable(
-            _GRID, "real", "m", "height at the image's pixel, before DEM coding"
-        ),
-        "absolute_phase": Variable(
-            _GRID,
-            "real",
-            "radian",
-            "absolute interferometric phase at the image's pixel",
-            "lower minus upper, flat-earth phase included (Eq. 11)",
-        ),
-        "phase_offset": Variable(
-            _GRID, "real", "radian", "phase added to fit the reference heights"
-        ),
-    },
-    "detections": {
-        "ground": Variable(_GRID, "real", "m", "height of the ground beneath obstacles"),
-        "height_above_ground": Variable(
-            _GRID, "real", "m", "reconstructed height above the ground beneath", "negative in holes"
-        ),
-        "height_noise": Variable(
-            _GRID, "real", "m", "standard deviation of the height expected from the coherence"
-        ),
-        "significant_height": Variable(
-            _GRID,
-            "real",
-            "m",
-            "height above the ground beneath where it exceeds its noise",
-            "0 where it does not, not a number where the image is dark",
-        ),
-        "map_class": Variable(
-            _GRID,
-            "integer",
-            "1",
-            "what the ground is taken for",
-            "0 free, 1 obstacle, 2 hole, 3 unknown: dark, or too noisy to tell",
-        ),
-        "contrast": Variable(
-            _GRID,
-            "real",
-            "1",
-            "multilooked power of the images over that of their surroundings",
-            "at the image's pixel, before DEM coding",
-        ),
-        "bright": Variable(
-            _GRID,
-            "flag",
-            "1",
-            "alarm of the 2-D detector, which sees the images' power alone",
-            flag_meanings="quiet alarm",
-        ),
-        "detected_x": Variable(_DETECTED, "real", "m", "centre of the detected area along x"),
-        "detected_y": Variable(_DETECTED, "real", "m", "centre of the detected area along y"),
-        "extent_x": Variable(_DETECTED, "real", "m", "extent of the detected area along x"),
-        "extent_y": Variable(_DETECTED, "real", "m", "extent of the detected area along y"),
-        "detected_area": Variable(_DETECTED, "real", "m2", "detected area"),
-        "detected_height": Variable(
-            _DETECTED,
-            "real",
-            "m",
-            "height of the detected area",
-            "what a tenth of it exceeds; negative for a hole",
-        ),
-    },
-    "detection_accuracy": {
-        "object_x": Variable(_OBJECT, "real", "m", "centre of the object along x"),
-        "object_y": Variable(_OBJECT, "real", "m", "centre of the object along y"),
-        "object_height": Variable(
-            _OBJECT, "real", "m", "height of the object", "negative for a ditch or pit"
-        ),
-        "height_found": Variable(
-            ("height_threshold", "object"),
-            "flag",
-            "1",
-            "object found by the height detector",
-            flag_meanings="missed found",
-        ),
-        "height_false_alarms": Variable(
-            ("height_threshold",), "integer", "1", "false alarms of the height detector"
-        ),
-        "amplitude_found": Variable(
-            ("amplitude_threshold", "object"),
-            "flag",
-            "1",
-            "object found by the 2-D detector",
-            flag_meanings="missed found",
-        ),
-        "amplitude_false_alarms": Variable(
-            ("amplitude_threshold",), "integer", "1", "false alarms of the 2-D detector"
-        ),
-        "object_unknown": Variable(
-            _OBJECT, "real", "1", "share of the object's ground that the map has as unknown"
-        ),
-        "object_free": Variable(
-            _OBJECT, "real", "1", "share of the object's ground that the map has as free"
-        ),
-        "shadow_unknown": Variable(
-            (), "real", "1", "share of the true shadow that the map has as unknown"
-        ),
-        "visible_unknown": Variable(
-            (), "real", "1", "share of visible ground beside objects that the map has as unknown"
-        ),
-        "scene_area": Variable((), "real", "m2", "area of the map"),
-    },
-    "focus": {
-        "point_gain": Variable(
-            ("channel",),
-            "real",
-            "1",
-            "amplitude of a point target at the image's centre relative to perfect focus",
-        ),
-        "peak_gain": Variable(
-            ("channel",),
-            "real",
-            "1",
-            "amplitude of the point target where its image lies, relative to perfect focus",
-        ),
-        "peak_shift": Variable(
-            ("channel", "ground_axis"),
-            "real",
-            "m",
-            "displacement of the point target's image from its position",
-            "by the least-squares match of the ranges",
-        ),
-    },
-    "accuracy": {
-        "height_error": Variable(_GRID, "real", "m", "height error, reconstructed minus true"),
-        "shadow": _SHADOW,
-        "mean": Variable(("region",), "real", "m", "mean height error"),
-        "std": Variable(("region",), "real", "m", "standard deviation of the height error"),
-        "median": Variable(("region",), "real", "m", "median height error"),
-        "mad": Variable(("region",), "real", "m", "median absolute deviation of the height error"),
-        "percentile_95_absolute": Variable(
-            ("region",), "real", "m", "95th percentile of the absolute height error"
-        ),
-        "maximum_absolute": Variable(("region",), "real", "m", "largest absolute height error"),
-        "fraction_within_tolerance": Variable(
-            ("region",),
-            "real",
-            "1",
-            "share of the region's cells with an error within the tolerance",
-        ),
-        "fraction_reconstructed": Variable(
-            ("region",), "real", "1", "share of the region's cells that have a height"
-        ),
-        "cell_count": Variable(("region",), "integer", "1", "number of cells in the region"),
-        "tolerance": Variable((), "real", "m", "height error that counts as within"),
-    },
-    "registration": {
-        "radial": Variable(
-            _SHIFT, "real", "m", "registration error, radial shift (Eqs. 6-7)", "lower minus upper"
-        ),
-        "equal_path": Variable(
-            _SHIFT,
-            "real",
-            "m",
-            "registration error, points of equal path and slope",
-            "lower minus upper; a circle around a rail, an ellipse otherwise",
-        ),
-        "measured": Variable(
-            _SHIFT,
-            "real",
-            "m",
-            "registration error measured on imaged point targets",
-            "lower minus upper",
-        ),
-        "image_shift": Variable(
-            ("channel", "ground_axis", "target", "target_height"),
-            "real",
-            "m",
-            "measured displacement of the imaged point target from its position",
-        ),
-        "target_position": Variable(
-            ("target", "ground_axis"), "real", "m", "position of the target on the ground"
-        ),
-        "resolution": Variable(
-            ("ground_axis", "target"), "real", "m", "resolution on the ground at the target"
-        ),
-        "map_radial": Variable(
-            ("ground_axis", "y", "x"),
-            "real",
-            "m",
-            "registration error over the scene, radial shift (Eqs. 6-7)",
-            "lower minus upper",
-        ),
-        "map_equal_path": Variable(
-            ("ground_axis", "y", "x"),
-            "real",
-            "m",
-            "registration error over the scene, points of equal path and slope",
-            "lower minus upper",
-        ),
-        "map_resolution": Variable(
-            ("ground_axis", "y", "x"), "real", "m", "resolution on the ground over the scene"
-        ),
-        "map_height": Variable((), "real", "m", "target height of the maps"),
-    },
-    "coupling": {
-        "scene_power": Variable(
-            ("slant_range",),
-            "real",
-            "1",
-            "mean power of the range profiles without coupling",
-            "over the mean of the image's slant ranges, of all positions and channels",
-        ),
-        "power": Variable(
-            ("weighting", "suppression", "slant_range"),
-            "real",
-            "1",
-            "mean power of the range profiles as received",
-            "over the mean of the image's slant ranges without coupling",
-        ),
-        "point_image": Variable(
-            ("suppression", "channel", "y", "x"),
-            "complex",
-            "1",
-            "image of a unit point target at its place after suppression",
-            "amplitude 1 and phase 0 without any",
-        ),
-        "common_share": Variable(
-            ("channel", "y", "x"),
-            "real",
-            "1",
-            "share of a target's amplitude that is common to all positions",
-        ),
-    },
-    "baseline_angle": {
-        "length_drawn": Variable(
-            ("baseline_angle",),
-            "real",
-            "m",
-            "standard deviation of the height under drawn errors of the baseline's length",
-            "by the exact inversion",
-        ),
-        "length_eq5": Variable(
-            ("baseline_angle",),
-            "real",
-            "m",
-            "standard deviation of the height from the baseline's length by Eq. 5",
-        ),
-        "length_exact": Variable(
-            ("baseline_angle",),
-            "real",
-            "m",
-            "standard deviation of the height from the baseline's length by the exact derivative",
-        ),
-        "angle_drawn": Variable(
-            ("baseline_angle",),
-            "real",
-            "m",
-            "standard deviation of the height under drawn errors of the baseline's attitude",
-            "by the exact inversion",
-        ),
-        "angle_eq12": Variable(
-            ("baseline_angle",),
-            "real",
-            "m",
-            "standard deviation of the height from the baseline's attitude by Eq. 12",
-        ),
-        "length_error": Variable(
-            (), "real", "m", "standard deviation of the error of the baseline's length"
-        ),
-        "angle_error": Variable(
-            (), "real", "radian", "standard deviation of the error of the baseline's attitude"
-        ),
-    },
-}
 
-SWEEP: dict[str, Variable] = {
-    name: variable
-    for name, variable in PRODUCTS["accuracy"].items()
-    if variable.dims == ("region",) and name != "cell_count"
-} | {
-    "coherence": Variable((), "real", "1", "median coherence on visible ground"),
-    "residues": Variable((), "integer", "1", "residues of the filtered phase"),
-    **PRODUCTS["focus"],
-}
-"""Variables of a sweep; the dimensions of the swept keys and of the realization come first."""
+def declare(
+    product: str,
+    variables: Mapping[str, Variable],
+    *,
+    coordinates: Mapping[str, Variable] | None = None,
+    check: Callable[[xr.Dataset], None] | None = None,
+) -> None:
+    """Declare a product; the module that makes it does so once.
 
-SWEEP_OF_OBJECTS: dict[str, Variable] = SWEEP | PRODUCTS["detection_accuracy"]
-"""Variables of a sweep over a scene with objects."""
+    Parameters
+    ----------
+    product
+        Its name.
+    variables
+        Its variables by name.
+    coordinates
+        The coordinates of dimensions that no other product has.
+    check
+        What refuses a dataset that departs from the declaration, if not `check`.
+
+    Raises
+    ------
+    ValueError
+        If the product or a coordinate is declared already, and otherwise.
+    """
+    if PRODUCTS.setdefault(product, dict(variables)) != dict(variables):
+        raise ValueError(f"product '{product}' is declared already, and otherwise")
+    for name, variable in (coordinates or {}).items():
+        if COORDINATES.setdefault(name, variable) != variable:
+            raise ValueError(f"coordinate '{name}' is declared already, and otherwise")
+    if check is not None:
+        _CHECKS[product] = check
+
 
 LABELS: dict[str, tuple[str, ...]] = {"channel": CHANNELS, "axis": AXES, "ground_axis": AXES[:2]}
 
@@ -583,46 +218,6 @@ def _make_coordinate(name: str, values: NDArray[Any]) -> _Coordinate:
     return made.variables[name], made.xindexes[name]
 
 
-def sweep_dataset(
-    data: Mapping[str, Any],
-    swept: Mapping[str, tuple[Any, dict[str, str]]],
-    coords: Mapping[str, Any] | None = None,
-) -> xr.Dataset:
-    """Make a sweep's product.
-
-    Parameters
-    ----------
-    data
-        An array for each variable of `SWEEP`, or of `SWEEP_OF_OBJECTS`: swept keys, realization,
-        then its own dimensions.
-    swept
-        Values and attributes of each swept key's dimension, in order.
-    coords
-        The coordinates' values of dimensions that are neither region nor channel.
-
-    Returns
-    -------
-    xarray.Dataset
-        Product ``sweep``.
-    """
-    result = xr.Dataset()
-    leading = (*swept, "realization")
-    for name, values in data.items():
-        variable = SWEEP_OF_OBJECTS[name]
-        result[name] = ((*leading, *variable.dims), values, variable.attrs)
-    for name, (labels, attrs) in swept.items():
-        result = result.assign_coords({name: (name, labels, attrs)})
-    own = {
-        "realization": np.arange(result.sizes["realization"]),
-        "region": np.array(REGIONS),
-        "channel": np.array(CHANNELS),
-        "ground_axis": np.array(LABELS["ground_axis"]),
-    }
-    for name, labels in (own | dict(coords or {})).items():
-        result = result.assign_coords({name: (name, labels, COORDINATES[name].attrs)})
-    return result
-
-
 def swept(data: xr.Dataset, *dims: str) -> xr.Dataset:
     """Return a sweep over some of its keys, each of its other keys at its first value.
 
@@ -643,9 +238,7 @@ def swept(data: xr.Dataset, *dims: str) -> xr.Dataset:
     ValueError
         If the sweep does not go over one of them.
     """
-    declared = SWEEP_OF_OBJECTS.values()
-    own = {"realization", *(dim for variable in declared for dim in variable.dims)}
-    keys = [str(dim) for dim in data.dims if dim not in own]
+    keys = [str(dim) for dim in data.dims if dim not in COORDINATES]
     missing = [dim for dim in dims if dim not in keys]
     if missing:
         raise ValueError(
@@ -670,8 +263,8 @@ def check(data: xr.Dataset, product: str) -> None:
         Names the first variable that is missing, undeclared, or departs in dimensions, type or
         attributes, with what is declared.
     """
-    if product == "sweep":
-        _check_sweep(data)
+    if product in _CHECKS:
+        _CHECKS[product](data)
         return
     declared = PRODUCTS[product]
     dims = {dim for variable in declared.values() for dim in variable.dims}
@@ -699,27 +292,4 @@ def check(data: xr.Dataset, product: str) -> None:
                 raise ValueError(
                     f"'{name}' of product '{product}' has {attribute}="
                     f"{array.attrs.get(attribute)!r}, but {value!r} is declared"
-                )
-
-
-def _check_sweep(data: xr.Dataset) -> None:
-    found = {str(name) for name in data.data_vars}
-    declared = SWEEP_OF_OBJECTS if found - set(SWEEP) else SWEEP
-    if found != set(declared):
-        raise ValueError(
-            f"product 'sweep' holds {sorted(found)}, but {sorted(declared)} are declared"
-        )
-    for name, variable in declared.items():
-        dims = data[name].dims
-        own = len(variable.dims)
-        if dims[len(dims) - own :] != variable.dims or "realization" not in dims:
-            raise ValueError(
-                f"'{name}' of product 'sweep' has the dimensions {dims}, but the swept keys, "
-                f"realization and {variable.dims} are declared"
-            )
-        for attribute, value in variable.attrs.items():
-            if data[name].attrs.get(attribute) != value:
-                raise ValueError(
-                    f"'{name}' of product 'sweep' has {attribute}="
-                    f"{data[name].attrs.get(attribute)!r}, but {value!r} is declared"
                 )

@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.processing import detection
 from vinsar.radar import aperture, formulas, geometry, instrument, trajectory
-from vinsar.study import config
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
 
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
@@ -91,7 +93,7 @@ class Claim:
     figures: dict[str, float]
 
 
-def evaluate(products: Products, study: config.Study) -> list[Claim]:
+def evaluate(products: Products, study: Study) -> list[Claim]:
     """Decide every claim of Figs. 2-5 and section 1.2.
 
     Parameters
@@ -214,7 +216,7 @@ def _registration_near_far(shifts: xr.Dataset) -> Claim:
     )
 
 
-def _height_per_baseline(study: config.Study, angle_deg: float) -> float:
+def _height_per_baseline(study: Study, angle_deg: float) -> float:
     # By the exact inversion with a baseline that is wrong by a millimetre, not by Eq. 5 itself.
     x, y = instrument.middle(study.scene)
     antenna, length = study.radar.rail_height_m, study.radar.baseline_m
@@ -236,7 +238,7 @@ def _height_per_baseline(study: config.Study, angle_deg: float) -> float:
     return float(np.abs(height)) / _BASELINE_ERROR_M
 
 
-def _vertical_baseline(study: config.Study) -> Claim:
+def _vertical_baseline(study: Study) -> Claim:
     vertical, horizontal = _height_per_baseline(study, 90), _height_per_baseline(study, 0)
     return Claim(
         "S12-vertical",
@@ -250,7 +252,7 @@ def _vertical_baseline(study: config.Study) -> Claim:
     )
 
 
-def _critical_baseline(products: Products, study: config.Study) -> Claim:
+def _critical_baseline(products: Products, study: Study) -> Claim:
     place = instrument.middle(study.scene)[0], study.scene.y_min_m
     planned = instrument.Instrument.planned(study.radar)
     look = planned.look_angle(*place)
@@ -284,7 +286,7 @@ def _critical_baseline(products: Products, study: config.Study) -> Claim:
     )
 
 
-def _speckle_and_shadow(products: Products, study: config.Study) -> Claim:
+def _speckle_and_shadow(products: Products, study: Study) -> Claim:
     truth = products["truth"]
     intensity = np.abs(products["images"]["image"].values) ** 2
     seen = truth["visible_fraction"].values
@@ -394,7 +396,7 @@ def _spread(accuracy: xr.Dataset) -> Claim:
     )
 
 
-def _grown(mask: Flags, products: Products, study: config.Study) -> Flags:
+def _grown(mask: Flags, products: Products, study: Study) -> Flags:
     """Grow a mask by a resolution cell: what an image cannot tell apart from it."""
     from scipy.ndimage import binary_dilation
 
@@ -404,7 +406,7 @@ def _grown(mask: Flags, products: Products, study: config.Study) -> Flags:
     return binary_dilation(mask, np.ones((2 * ahead + 1, 2 * across + 1), bool))
 
 
-def _worst_error(products: Products, study: config.Study) -> Claim:
+def _worst_error(products: Products, study: Study) -> Claim:
     error = np.abs(products["accuracy"]["height_error"].values)
     limit = 4 * float(products["accuracy"]["tolerance"])
     shadow = products["truth"]["shadow"].values
@@ -432,7 +434,7 @@ def _worst_error(products: Products, study: config.Study) -> Claim:
     )
 
 
-def _false_alarms(products: Products, study: config.Study) -> Claim:
+def _false_alarms(products: Products, study: Study) -> Claim:
     from scipy.ndimage import label
 
     kind = products["detections"]["map_class"].values
@@ -500,7 +502,7 @@ class _Shaken:
     random: float
 
     @classmethod
-    def of(cls, products: Products, study: config.Study) -> _Shaken:
+    def of(cls, products: Products, study: Study) -> _Shaken:
         sweep = variables.swept(
             products["sweeps/vibration"],
             "motion_channels",
@@ -512,8 +514,8 @@ class _Shaken:
         scatter = (
             deviation.std("realization", ddof=1) if count > 1 else 0 * deviation.mean("realization")
         )
-        radar_ = config.swept_section(study, "vibration", "radar")
-        place = instrument.middle(config.swept_section(study, "vibration", "scene"))
+        radar_ = swept_section(study, "vibration", "radar")
+        place = instrument.middle(swept_section(study, "vibration", "scene"))
         return cls(
             deviation.mean("realization"),
             scatter / np.sqrt(count),

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+    from vinsar.processing.focusing import Imaging
+    from vinsar.simulation.scene import Scene
 
     Floats = NDArray[np.floating]
 
@@ -91,7 +93,7 @@ class Sheet:
         The configuration, or `SECTIONS` of it.
     """
 
-    study: config.Study
+    study: Study
 
     @cached_property
     def antennas(self) -> xr.Dataset:
@@ -127,7 +129,7 @@ class Sheet:
         return trajectory.scan_duration(self.study.radar, self.study.vehicle, self.samples)
 
     @property
-    def scene(self) -> config.Scene | config.Imaging:
+    def scene(self) -> Scene | Imaging:
         """What scatters: the scene, or the image's ground where echoes are measured."""
         measured = self.study.measurement.file is not None
         return self.study.imaging if measured else self.study.scene

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import swept_section
 from vinsar.foundations.constants import CHANNELS
 from vinsar.radar import instrument, trajectory
-from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from vinsar.foundations.configuration import Study
 
 SWEEP = "systems"
 """The sweep that the comparison is made from; it goes over the section ``radar`` alone."""
@@ -47,7 +49,7 @@ class System:
     accuracy: xr.Dataset
 
 
-def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
+def compare(sweep: xr.Dataset, study: Study) -> list[System]:
     """Return the arrangements of the sweep `SWEEP`, in its order.
 
     Parameters
@@ -65,8 +67,8 @@ def compare(sweep: xr.Dataset, study: config.Study) -> list[System]:
     over = study.sweeps[SWEEP].over
     if list(over) != ["radar"]:
         raise ValueError(f"the sweep '{SWEEP}' goes over {', '.join(over)}; radar alone is needed")
-    common = config.swept_section(study, SWEEP, "radar")
-    scene = config.swept_section(study, SWEEP, "scene")
+    common = swept_section(study, SWEEP, "radar")
+    scene = swept_section(study, SWEEP, "scene")
     statistics = variables.swept(sweep, "radar")
     found = []
     for number, changes in enumerate(over["radar"]):

@@ -13,14 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import variables
-from vinsar.processing import height
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.processing import height, interferogram
 from vinsar.radar import aperture, geometry, speckle, trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
@@ -44,6 +48,95 @@ _LEAST_COHERENCE = 1e-2
 
 # Residuals below this do not gain weight in the fit of the ground, m.
 _LEAST_RESIDUAL_M = 1e-3
+
+
+_DETECTED = ("detection",)
+
+variables.declare(
+    "detections",
+    {
+        "ground": Variable(GRID, "real", "m", "height of the ground beneath obstacles"),
+        "height_above_ground": Variable(
+            GRID, "real", "m", "reconstructed height above the ground beneath", "negative in holes"
+        ),
+        "height_noise": Variable(
+            GRID, "real", "m", "standard deviation of the height expected from the coherence"
+        ),
+        "significant_height": Variable(
+            GRID,
+            "real",
+            "m",
+            "height above the ground beneath where it exceeds its noise",
+            "0 where it does not, not a number where the image is dark",
+        ),
+        "map_class": Variable(
+            GRID,
+            "integer",
+            "1",
+            "what the ground is taken for",
+            "0 free, 1 obstacle, 2 hole, 3 unknown: dark, or too noisy to tell",
+        ),
+        "contrast": Variable(
+            GRID,
+            "real",
+            "1",
+            "multilooked power of the images over that of their surroundings",
+            "at the image's pixel, before DEM coding",
+        ),
+        "bright": Variable(
+            GRID,
+            "flag",
+            "1",
+            "alarm of the 2-D detector, which sees the images' power alone",
+            flag_meanings="quiet alarm",
+        ),
+        "detected_x": Variable(_DETECTED, "real", "m", "centre of the detected area along x"),
+        "detected_y": Variable(_DETECTED, "real", "m", "centre of the detected area along y"),
+        "extent_x": Variable(_DETECTED, "real", "m", "extent of the detected area along x"),
+        "extent_y": Variable(_DETECTED, "real", "m", "extent of the detected area along y"),
+        "detected_area": Variable(_DETECTED, "real", "m2", "detected area"),
+        "detected_height": Variable(
+            _DETECTED,
+            "real",
+            "m",
+            "height of the detected area",
+            "what a tenth of it exceeds; negative for a hole",
+        ),
+    },
+    coordinates={
+        "detection": Variable(("detection",), "integer", "1", "number of the detected area")
+    },
+)
+
+
+class Detection(Section, name="detection"):
+    """Detection of obstacles and holes on the heights, and on an image alone."""
+
+    threshold_m: float = key("height or depth from the ground that is an alarm", "ours", gt=0)
+    noise_factor: float = key(
+        "an alarm exceeds as many standard deviations of the height's noise, as the coherence lets "
+        "expect it; where they exceed the threshold, the ground is unknown",
+        "ours",
+        gt=0,
+    )
+    minimum_area_m2: float = key("connected area that is an alarm", "ours", gt=0)
+    ground_window_m: float | None = key(
+        "side of the running median that follows rolling ground; null for a plane alone",
+        "ours",
+        gt=0,
+    )
+    multilook_window_m: float = key(
+        "side of the window over which the image's power is averaged", "ours", gt=0
+    )
+    background_window_m: float = key(
+        "side of the window whose median power is that of the surroundings", "ours", gt=0
+    )
+    shadow_level_db: float = key(
+        "power relative to the surroundings below which the ground is unknown", "ours", lt=0
+    )
+    amplitude_threshold_db: float = key(
+        "power relative to the surroundings that is an alarm of the image alone", "ours", gt=0
+    )
 
 
 def regions(alarm: Flags, least_cells: float) -> tuple[NDArray[np.integer], int]:
@@ -179,7 +272,7 @@ def detect(
     images: xr.Dataset,
     interferogram: xr.Dataset,
     *,
-    options: config.Detection,
+    options: Detection,
     looks: float,
 ) -> xr.Dataset:
     """Find obstacles and holes.
@@ -266,3 +359,22 @@ def _describe(area: Flags, residual: Floats, x: Floats, y: Floats) -> tuple[floa
         row.size * spacing**2,
         sign * float(np.percentile(sign * values, _PERCENTILE)),
     )
+
+
+def _detections(products: Products, study: Study) -> xr.Dataset:
+    return detect(
+        products["dem"],
+        products["images"],
+        products["interferogram"],
+        options=study.detection,
+        looks=interferogram.looks(products["trajectory"], study),
+    )
+
+
+STAGES = {
+    "detections": Stage(
+        _detections,
+        inputs=("dem", "images", "interferogram", "trajectory"),
+        sections=(*interferogram.LOOKS_KEYS, "detection"),
+    ),
+}

@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vinsar.foundations import blocks, variables
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     import xarray as xr
     from numpy.typing import NDArray
 
-    Complexes = NDArray[np.complexfloating]
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
-FilterName = Literal["goldstein", "boxcar", "none"]
+    Complexes = NDArray[np.complexfloating]
 
 # Patches in one batch of transforms: 4 MB, so that they stay in the cache.
 _PIXELS_PER_BATCH = 500_000
+
+
+variables.declare(
+    "filtered",
+    {
+        "interferogram": Variable(GRID, "complex", "1", "filtered interferogram"),
+    },
+)
 
 
 def goldstein(
@@ -164,15 +179,50 @@ def gaussian(interferogram: Complexes, *, std_px: float) -> NDArray[np.complex64
     return values
 
 
-def apply(
-    interferogram: xr.Dataset,
+def _goldstein(
+    values: Complexes,
     *,
-    method: FilterName,
     goldstein_alpha: float,
     goldstein_patch_px: int,
     goldstein_step_px: int,
-    boxcar_window_px: int,
-) -> xr.Dataset:
+    **_: Any,
+) -> Complexes:
+    return goldstein(
+        values, alpha=goldstein_alpha, patch_px=goldstein_patch_px, step_px=goldstein_step_px
+    )
+
+
+def _boxcar(values: Complexes, *, boxcar_window_px: int, **_: Any) -> Complexes:
+    return boxcar(values, window_px=boxcar_window_px)
+
+
+def _none(values: Complexes, **_: Any) -> Complexes:
+    return values
+
+
+FILTERS: dict[str, Callable[..., Complexes]] = {
+    "goldstein": _goldstein,
+    "boxcar": _boxcar,
+    "none": _none,
+}
+"""The filters by name; each takes the interferogram and, by keyword, the keys of `Filtering`."""
+
+
+class Filtering(Section, name="filtering"):
+    """The filter of the interferometric phase."""
+
+    method: Literal[*FILTERS] = key(  # type: ignore[valid-type]
+        "the filter", "section 2.2"
+    )
+    goldstein_alpha: float = key(
+        "strength: exponent of the smoothed spectrum", "reference 19", ge=0, le=1
+    )
+    goldstein_patch_px: int = key("side of a patch", "reference 19", ge=4)
+    goldstein_step_px: int = key("step between patches", "reference 19", ge=1)
+    boxcar_window_px: int = key("side of the boxcar, odd", "not mentioned", ge=1)
+
+
+def apply(interferogram: xr.Dataset, *, method: str, **options: Any) -> xr.Dataset:
     """Filter an interferogram with the chosen filter.
 
     Parameters
@@ -180,26 +230,53 @@ def apply(
     interferogram
         Product ``interferogram``.
     method
-        The filter; ``none`` passes the interferogram on.
-    goldstein_alpha, goldstein_patch_px, goldstein_step_px
-        As in `goldstein`.
-    boxcar_window_px
-        As in `boxcar`.
+        A key of `FILTERS`; ``none`` passes the interferogram on.
+    options
+        The keys of `Filtering` that the filter reads.
 
     Returns
     -------
     xarray.Dataset
         Product ``filtered``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such filter.
     """
-    values = interferogram["interferogram"].values
-    if method == "goldstein":
-        values = goldstein(
-            values, alpha=goldstein_alpha, patch_px=goldstein_patch_px, step_px=goldstein_step_px
-        )
-    elif method == "boxcar":
-        values = boxcar(values, window_px=boxcar_window_px)
+    if method not in FILTERS:
+        raise ValueError(f"no filter '{method}'; there are {', '.join(FILTERS)}")
     return variables.dataset(
         "filtered",
-        {"interferogram": values},
+        {"interferogram": FILTERS[method](interferogram["interferogram"].values, **options)},
         {"x": interferogram["x"].values, "y": interferogram["y"].values},
     )
+
+
+def _filtered(products: Products, study: Study) -> xr.Dataset:
+    return apply(products["interferogram"], **study.filtering.model_dump())
+
+
+def _goldstein_step(filtering: Filtering) -> Iterator[Fault]:
+    patch, step = filtering.goldstein_patch_px, filtering.goldstein_step_px
+    if patch % step or patch < 2 * step:
+        steps = [n for n in range(1, patch // 2 + 1) if patch % n == 0]
+        yield Fault(
+            "filtering.goldstein_step_px",
+            step,
+            f"must divide filtering.goldstein_patch_px, {patch}, at least twice: "
+            + ", ".join(map(str, steps)),
+        )
+
+
+def _odd_boxcar(filtering: Filtering) -> Iterator[Fault]:
+    if filtering.boxcar_window_px % 2 == 0:
+        yield Fault("filtering.boxcar_window_px", filtering.boxcar_window_px, "must be odd")
+
+
+STAGES = {
+    "filtered": Stage(_filtered, inputs=("interferogram",), sections=("filtering",), parallel=True),
+}
+
+
+CHECKS = (_goldstein_step, _odd_boxcar)

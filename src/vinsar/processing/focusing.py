@@ -7,13 +7,24 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vinsar.foundations import blocks, variables
+from vinsar.foundations import blocks, randomness, variables
+from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
-from vinsar.radar import trajectory, waveform
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import Variable
+from vinsar.processing import leakage
+from vinsar.radar import grid, motion, trajectory, waveform
+from vinsar.radar.trajectory import ANTENNAS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.errors import Fault
+    from vinsar.foundations.stage import Products
 
 logger = logging.getLogger(__name__)
 
@@ -24,6 +35,63 @@ _SINC_POWER: dict[str, int] = {"linear": 2, "cubic": 4}
 
 _ROWS_PER_BLOCK = 32
 _POSITIONS_PER_BLOCK = 128
+
+
+# Slant range by which the profiles exceed the image: position errors shall not need new ones.
+_PROFILE_MARGIN_M = 0.5
+
+variables.declare(
+    "profiles",
+    {
+        "profile": Variable(
+            ("channel", "position", "slant_range"),
+            "complex",
+            "1",
+            "range-compressed profile",
+            "at baseband: the carrier's phase over the slant-range axis is removed; "
+            "a unit point target peaks at 1",
+        ),
+        "carrier_frequency": Variable((), "real", "Hz", "carrier frequency of the profiles"),
+    },
+)
+variables.declare(
+    "images",
+    {
+        "image": Variable(
+            ("channel", "y", "x"),
+            "complex",
+            "1",
+            "complex image focused on the ground plane",
+            "a unit point target on the ground plane gives amplitude 1 and phase 0",
+        ),
+        "wavelength": Variable((), "real", "m", "wavelength of the carrier"),
+        **ANTENNAS,
+    },
+)
+
+
+class Imaging(Section, name="imaging"):
+    """Range compression and back-projection."""
+
+    x_min_m: float = key("left edge of the image", "section 2")
+    x_max_m: float = key("right edge of the image", "section 2")
+    y_min_m: float = key("near edge of the image", "section 2")
+    y_max_m: float = key("far edge of the image", "section 2")
+    grid_spacing_m: float = key("pixel spacing of image and DEM", "not given", gt=0)
+    range_window: Literal["rectangular", "hann", "hamming", "blackman"] = key(
+        "weighting of the frequencies", "not mentioned"
+    )
+    aperture_window: Literal["rectangular", "hann", "hamming", "blackman"] = key(
+        "weighting of the antenna positions", "not mentioned"
+    )
+    oversampling: int = key(
+        "range samples per resolution cell before interpolation", "not given", ge=2, le=128
+    )
+    interpolation: Literal["linear", "cubic"] = key(
+        "interpolation of the range profiles: linear errs by -64 dB at an oversampling of 16; "
+        "cubic by -79 dB at 4, -93 dB at 6 and -103 dB at 8",
+        "not given",
+    )
 
 
 def compress(
@@ -246,3 +314,70 @@ def _rail(
     even = all(np.abs(found - expected).max() < 1e-9 for found, expected in [*places, grid])
     last = (len(transmitter) - 1) * abs(spacing / classes - pitch / stride)
     return (pitch, classes, stride) if even and last < 1e-9 else None
+
+
+def _profiles(products: Products, study: Study) -> xr.Dataset:
+    antennas = motion.advance(
+        products["trajectory"],
+        speed_m_per_s=motion.told_speed(study),
+        duration_s=study.vehicle.scan_duration_s,
+    )
+    near, far = trajectory.range_extent(antennas, *grid.image_axes(study.imaging))
+    return compress(
+        leakage.suppress(products["received"], **study.suppression.model_dump()),
+        near_range_m=max(0.0, near - _PROFILE_MARGIN_M),
+        far_range_m=far + _PROFILE_MARGIN_M,
+        window=study.imaging.range_window,
+        oversampling=study.imaging.oversampling,
+        interpolation=study.imaging.interpolation,
+    )
+
+
+def _images(products: Products, study: Study) -> xr.Dataset:
+    x, y = grid.image_axes(study.imaging)
+    return backproject(
+        products["profiles"],
+        products["recorded_trajectory"],
+        x=x,
+        y=y,
+        window=study.imaging.aperture_window,
+    )
+
+
+def _image_grid(imaging: Imaging) -> Iterator[Fault]:
+    faults = list(grid.check_extent("imaging", imaging))
+    yield from faults
+    if faults:
+        return
+    for axis in "xy":
+        low, high = getattr(imaging, f"{axis}_min_m"), getattr(imaging, f"{axis}_max_m")
+        yield from grid.check_multiple(
+            "imaging.grid_spacing_m", imaging.grid_spacing_m, low, high, imaging.grid_spacing_m
+        )
+
+
+STAGES = {
+    "profiles": Stage(
+        _profiles,
+        inputs=("received", "trajectory"),
+        sections=(
+            *randomness.KEYS,
+            *grid.KEYS,
+            "vehicle",
+            "suppression",
+            "imaging.range_window",
+            "imaging.oversampling",
+            "imaging.interpolation",
+        ),
+    ),
+    "images": Stage(
+        _images,
+        inputs=("profiles", "recorded_trajectory"),
+        sections=(*grid.KEYS, "imaging.aperture_window"),
+        by_channel=True,
+        parallel=True,
+    ),
+}
+
+
+CHECKS = (_image_grid,)

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from vinsar.foundations import variables
-from vinsar.radar import aperture, geometry, trajectory
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.radar import aperture, geometry, grid, trajectory
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
 
@@ -25,6 +33,62 @@ Extent = tuple[float, float, float, float]
 
 # Residual below which a reference point gains no more weight in the fit of a plane, rad.
 _LEAST_RESIDUAL = 1e-3
+
+
+variables.declare(
+    "dem",
+    {
+        "height": Variable(GRID, "real", "m", "reconstructed height above the ground plane"),
+        "image_height": Variable(
+            GRID, "real", "m", "height at the image's pixel, before DEM coding"
+        ),
+        "absolute_phase": Variable(
+            GRID,
+            "real",
+            "radian",
+            "absolute interferometric phase at the image's pixel",
+            "lower minus upper, flat-earth phase included (Eq. 11)",
+        ),
+        "phase_offset": Variable(
+            GRID, "real", "radian", "phase added to fit the reference heights"
+        ),
+    },
+)
+
+
+class Rectangle(Section):
+    """A rectangle on the ground."""
+
+    x_min_m: float = key("left edge", "not given")
+    x_max_m: float = key("right edge", "not given")
+    y_min_m: float = key("near edge", "not given")
+    y_max_m: float = key("far edge", "not given")
+
+
+class ControlPoint(Section):
+    """A surveyed point."""
+
+    x_m: float = key("position along the rail", "section 2.3")
+    y_m: float = key("position ahead", "section 2.3")
+    height_m: float = key("surveyed height", "section 2.3")
+
+
+class Height(Section, name="height"):
+    """Inversion of the phase and its unknown constant."""
+
+    reference: Literal["level_ground", "control_points"] = key(
+        "what fixes the unknown phase constant", "section 2.3"
+    )
+    level_ground: Annotated[tuple[Rectangle, ...], Field(strict=False)] = key(
+        "ground that the user declares level", "not given"
+    )
+    level_ground_height_m: float = key("height of the level ground", "not given")
+    control_points: Annotated[tuple[ControlPoint, ...], Field(strict=False)] = key(
+        "points of known height, one or more", "section 2.3"
+    )
+    trend: Literal["constant", "plane"] = key(
+        "what is fitted to the reference's phase: a constant, or a plane in x and y", "section 2.3"
+    )
 
 
 def level_ground(
@@ -213,3 +277,42 @@ def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Data
         },
         {"x": x, "y": y},
     )
+
+
+def _dem(products: Products, study: Study) -> xr.Dataset:
+    options = study.height
+    if options.reference == "level_ground":
+        points = level_ground(
+            products["unwrapped"]["x"].values,
+            products["unwrapped"]["y"].values,
+            [(r.x_min_m, r.x_max_m, r.y_min_m, r.y_max_m) for r in options.level_ground],
+            options.level_ground_height_m,
+        )
+    else:
+        rows = np.array([(p.x_m, p.y_m, p.height_m) for p in options.control_points])
+        points = rows[:, 0], rows[:, 1], rows[:, 2]
+    offset = phase_offset(products["unwrapped"], products["images"], points, trend=options.trend)
+    return invert(products["unwrapped"], products["images"], offset)
+
+
+def _reference_exists(height: Height) -> Iterator[Fault]:
+    for number, rectangle in enumerate(height.level_ground):
+        yield from grid.check_extent(f"height.level_ground[{number}]", rectangle)
+    if height.reference == "level_ground" and not height.level_ground:
+        yield Fault("height.level_ground", (), "must hold one rectangle or more")
+    if height.reference == "control_points":
+        least = 3 if height.trend == "plane" else 1
+        if len(height.control_points) < least:
+            yield Fault(
+                "height.control_points",
+                f"{len(height.control_points)} points",
+                f"must hold {least} or more for height.trend '{height.trend}'",
+            )
+
+
+STAGES = {
+    "dem": Stage(_dem, inputs=("unwrapped", "images"), sections=("height",)),
+}
+
+
+CHECKS = (_reference_exists,)

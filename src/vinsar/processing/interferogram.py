@@ -7,10 +7,42 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.radar import grid, trajectory, waveform
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+
+
+LOOKS_KEYS = (*waveform.KEYS, *grid.KEYS, "interferogram")
+"""Keys of the configuration that `looks` depends on."""
+
+variables.declare(
+    "interferogram",
+    {
+        "interferogram": Variable(
+            GRID, "complex", "1", "interferogram, lower times conjugate upper (Eq. 10)"
+        ),
+        "coherence": Variable(GRID, "real", "1", "multilooked coherence magnitude"),
+    },
+)
+
+
+class Interferogram(Section, name="interferogram"):
+    """Interferogram and coherence."""
+
+    coherence_window_px: int = key(
+        "side of the multilook window of the coherence, odd", "not mentioned", ge=1
+    )
 
 
 def coherence(
@@ -71,3 +103,45 @@ def form(images: xr.Dataset, *, coherence_window_px: int) -> xr.Dataset:
         },
         {"x": images["x"].values, "y": images["y"].values},
     )
+
+
+def looks(antennas: xr.Dataset, study: Study) -> float:
+    """Return the effective number of looks of the coherence.
+
+    The multilook window's area over that of a resolution cell at the middle of the image, at
+    least 1: pixels finer than the resolution are not independent.
+
+    Parameters
+    ----------
+    antennas
+        Product ``trajectory``.
+    study
+        The configuration.
+    """
+    x, y = grid.image_axes(study.imaging)
+    cell = waveform.ground_resolution(
+        trajectory.apertures(antennas)[0],
+        (x[0] + x[-1]) / 2,
+        (y[0] + y[-1]) / 2,
+        frequency=waveform.sampled(study.radar),
+    )
+    side = study.interferogram.coherence_window_px * study.imaging.grid_spacing_m
+    return max(1.0, float(side**2 / (cell[0] * cell[1])))
+
+
+def _interferogram(products: Products, study: Study) -> xr.Dataset:
+    return form(products["images"], coherence_window_px=study.interferogram.coherence_window_px)
+
+
+def _odd_window(interferogram: Interferogram) -> Iterator[Fault]:
+    window = interferogram.coherence_window_px
+    if window % 2 == 0:
+        yield Fault("interferogram.coherence_window_px", window, "must be odd")
+
+
+STAGES = {
+    "interferogram": Stage(_interferogram, inputs=("images",), sections=("interferogram",)),
+}
+
+
+CHECKS = (_odd_window,)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.radar import waveform
 
@@ -26,6 +27,17 @@ METHODS: tuple[Method, ...] = ("none", "gate", "common", "both")
 # than that are as many as the range has cells, and fewer than these besides.
 _LEFT = 1e-6
 _EDGE = 24
+
+
+class Suppression(Section, name="suppression"):
+    """Suppression of the coupling between transmitter and receiver."""
+
+    method: Literal["none", "gate", "common", "both"] = key(
+        "what is removed from the echo: returns from within the gate, what is common to all "
+        "antenna positions, or both",
+        "future work",
+    )
+    gate_range_m: float = key("slant range up to which the gate removes returns", "ours", gt=0)
 
 
 def suppress(echo: xr.Dataset, *, method: Method, gate_range_m: float) -> xr.Dataset:

@@ -9,6 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from vinsar.foundations import variables
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.processing import interferogram
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,10 +20,32 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
 
-UnwrapperName = Literal["whirlwind", "skimage", "kamui", "snaphu"]
+
+variables.declare(
+    "unwrapped",
+    {
+        "phase": Variable(
+            GRID,
+            "real",
+            "radian",
+            "unwrapped interferometric phase without the flat-earth phase",
+            "lower minus upper; known up to one constant",
+        ),
+        "residue": Variable(
+            GRID,
+            "integer",
+            "1",
+            "residue of the filtered phase",
+            "winding number of the four cells whose least x and y are this one's: -1, 0 or 1",
+        ),
+    },
+)
 
 
 def residues(phase: Floats) -> NDArray[np.int8]:
@@ -108,7 +134,7 @@ def _snaphu(values: Complexes, coherence: Floats, looks: float) -> Floats:
     return np.asarray(unwrapped)
 
 
-_UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float], Floats]] = {
+UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float], Floats]] = {
     "whirlwind": _whirlwind,
     "skimage": _skimage,
     "kamui": _kamui,
@@ -116,8 +142,16 @@ _UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float], Floats]] = {
 }
 
 
+class Unwrapping(Section, name="unwrapping"):
+    """Phase unwrapping."""
+
+    method: Literal[*UNWRAPPERS] = key(  # type: ignore[valid-type]
+        "the unwrapper; snaphu has to be installed by you", "section 2.3, reference 15"
+    )
+
+
 def unwrap(
-    filtered: xr.Dataset, coherence: xr.DataArray, *, method: UnwrapperName, looks: float
+    filtered: xr.Dataset, coherence: xr.DataArray, *, method: str, looks: float
 ) -> xr.Dataset:
     """Unwrap the filtered phase.
 
@@ -142,11 +176,11 @@ def unwrap(
     ValueError
         If the method is unknown or not installed.
     """
-    if method not in _UNWRAPPERS:
-        raise ValueError(f"no unwrapper '{method}'; there are {', '.join(_UNWRAPPERS)}")
+    if method not in UNWRAPPERS:
+        raise ValueError(f"no unwrapper '{method}'; there are {', '.join(UNWRAPPERS)}")
     values = filtered["interferogram"].values
     wrapped = np.angle(values).astype(float)
-    unwrapped = _UNWRAPPERS[method](values, coherence.values, looks).astype(float)
+    unwrapped = UNWRAPPERS[method](values, coherence.values, looks).astype(float)
     # Solvers work in single precision and from any level: keep only their whole cycles.
     added = unwrapped - wrapped
     level = np.angle(np.exp(1j * added).mean())
@@ -156,3 +190,21 @@ def unwrap(
         {"phase": wrapped + 2 * np.pi * cycles, "residue": residues(wrapped)},
         {"x": filtered["x"].values, "y": filtered["y"].values},
     )
+
+
+def _unwrapped(products: Products, study: Study) -> xr.Dataset:
+    return unwrap(
+        products["filtered"],
+        products["interferogram"]["coherence"],
+        method=study.unwrapping.method,
+        looks=interferogram.looks(products["trajectory"], study),
+    )
+
+
+STAGES = {
+    "unwrapped": Stage(
+        _unwrapped,
+        inputs=("filtered", "interferogram", "trajectory"),
+        sections=(*interferogram.LOOKS_KEYS, "unwrapping"),
+    ),
+}

@@ -12,23 +12,16 @@ attitude at which a length error does no harm from ``beta = theta`` to
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar.foundations import variables
 from vinsar.radar import formulas, geometry, waveform
 
 if TYPE_CHECKING:
-    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from vinsar.study import config
-
     Floats = NDArray[np.floating]
-
-ANGLES_DEG = np.arange(0.0, 91.0)
-"""Attitudes that `angle_errors` goes through, deg."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +76,7 @@ class View:
         return np.asarray(baseline_m) * abs(np.cos(self.baseline_angle - self.look))
 
 
-def view(radar_: config.Radar, scene: config.Scene) -> View:
+def view(radar_: Any, scene: Any) -> View:
     """Return a radar over the middle of its scene.
 
     On a rail and in a receive pair the antennas stand on x = y = 0.
@@ -141,79 +134,3 @@ def height_per_length(seen: View, baseline_m: float, baseline_angle: ArrayLike) 
     look = np.arctan2(ground, height)
     angle = np.asarray(baseline_angle) - look
     return ground * np.tan(angle) / baseline_m + ground / across_range / np.cos(angle)
-
-
-def angle_errors(
-    seen: View,
-    *,
-    baseline_m: float,
-    length_std_m: float,
-    angle_std_deg: float,
-    draws: int,
-    rng: np.random.Generator,
-) -> xr.Dataset:
-    """Return what errors of the baseline do to the height, by the baseline's attitude.
-
-    The true baseline gives the phase of the middle of the scene; a length, or an attitude, drawn
-    from a normal distribution around the true one then inverts it exactly
-    (`geometry.invert_height`). No height reference takes any of the error away again.
-
-    Parameters
-    ----------
-    seen
-        The geometry; its own attitude is not read.
-    baseline_m
-        Length of the baseline, m.
-    length_std_m
-        Standard deviation of the length that the inversion is told, m.
-    angle_std_deg
-        Standard deviation of the attitude that the inversion is told, deg.
-    draws
-        Draws at each attitude, of each of the two errors.
-    rng
-        Source of randomness.
-
-    Returns
-    -------
-    xarray.Dataset
-        Product ``baseline_angle``, for attitudes from 0 to 90 deg.
-    """
-    angles = np.deg2rad(ANGLES_DEG)[:, None]
-    angle_std = float(np.deg2rad(angle_std_deg))
-    upper = [
-        seen.lower + baseline_m * np.array([0.0, np.cos(beta), np.sin(beta)])
-        for beta in angles[:, 0]
-    ]
-    r2 = np.array([geometry.slant_range(antenna, seen.x_m, seen.y_m) for antenna in upper])
-    phase = geometry.interferometric_phase(seen.slant_range, r2, seen.wavelength_m)[:, None]
-
-    def std(length: ArrayLike, angle: Floats) -> Floats:
-        height = geometry.invert_height(
-            seen.slant_range,
-            phase,
-            baseline_m=length,
-            baseline_angle=angle,
-            antenna_height=float(seen.lower[2]),
-            along_track=seen.x_m - seen.lower[0],
-            wavelength_m=seen.wavelength_m,
-        )
-        return np.nanstd(height, axis=1)
-
-    # Each attitude has draws of its own: its neighbours show how far chance carries it.
-    unit = rng.standard_normal((2, angles.size, draws))
-    eq5 = formulas.height_per_baseline_length(seen.slant_range, baseline_m, angles[:, 0], seen.look)
-    eq12 = formulas.height_per_baseline_angle(seen.slant_range, seen.look)
-    exact = height_per_length(seen, baseline_m, angles[:, 0])
-    return variables.dataset(
-        "baseline_angle",
-        {
-            "length_drawn": std(baseline_m + length_std_m * unit[0], angles),
-            "length_eq5": length_std_m * np.abs(eq5),
-            "length_exact": length_std_m * np.abs(exact),
-            "angle_drawn": std(baseline_m, angles + angle_std * unit[1]),
-            "angle_eq12": np.full(angles.size, angle_std * float(eq12)),
-            "length_error": length_std_m,
-            "angle_error": angle_std,
-        },
-        {"baseline_angle": angles[:, 0]},
-    )

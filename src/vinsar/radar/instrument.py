@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from vinsar.study import config
+    from vinsar.processing.focusing import Imaging
+    from vinsar.radar.trajectory import Radar
+    from vinsar.simulation.scene import Scene
 
     Floats = NDArray[np.floating]
 
@@ -64,7 +66,7 @@ class Instrument:
         return cls(lower, upper, antennas["receiver"].sizes["position"], frequency)
 
     @classmethod
-    def planned(cls, radar: config.Radar) -> Instrument:
+    def planned(cls, radar: Radar) -> Instrument:
         """Return the instrument of a configuration's section ``radar``, without any errors."""
         frequency = waveform.frequencies(
             radar.start_frequency_hz, radar.stop_frequency_hz, radar.frequency_count
@@ -307,6 +309,6 @@ class Instrument:
         return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
 
 
-def middle(area: config.Scene | config.Imaging) -> tuple[float, float]:
+def middle(area: Scene | Imaging) -> tuple[float, float]:
     """Return the middle of a part of the ground, x and y in m."""
     return (area.x_min_m + area.x_max_m) / 2, (area.y_min_m + area.y_max_m) / 2

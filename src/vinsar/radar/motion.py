@@ -11,8 +11,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.polynomial import polynomial
 
-from vinsar.foundations import variables
+from vinsar.foundations import randomness, variables
+from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import AXES, SPEED_OF_LIGHT
+from vinsar.foundations.randomness import Draw
+from vinsar.foundations.stage import Stage
+from vinsar.radar import waveform
+from vinsar.radar.trajectory import ANTENNAS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,11 +25,68 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+
     Floats = NDArray[np.floating]
 
 AxisName = Literal["x", "y", "z"]
 Distribution = Literal["uniform", "normal"]
 Spectrum = Literal["white", "sinusoidal", "random_walk"]
+
+
+variables.declare("true_trajectory", ANTENNAS)
+variables.declare("recorded_trajectory", ANTENNAS)
+
+
+class Motion(Section, name="motion"):
+    """Errors of the antenna positions (Fig. 5)."""
+
+    axis: Literal["x", "y", "z"] = key("axis along which the positions err", "section 2.4")
+    level_wavelengths: float = key(
+        "standard deviation of the error in wavelengths; 0 for none", "Fig. 5", ge=0
+    )
+    distribution: Literal["uniform", "normal"] = key(
+        "of the errors; a uniform one has the half-width sqrt(3) sigma", "section 2.4"
+    )
+    channels: Literal["common", "independent"] = key(
+        "one error for both antennas (the vehicle shakes), or one for each (their positions are "
+        "measured by themselves)",
+        "not given",
+    )
+    spectrum: Literal["white", "sinusoidal", "random_walk"] = key(
+        "independent errors, one vibration, or drift", "section 2.4 has white errors"
+    )
+    cycles_per_aperture: float = key("periods of the vibration over the scan", "ours", gt=0)
+    affects: Literal["recorded", "true"] = key(
+        "what errs: the positions that imaging is told, or the true ones while it is told the "
+        "undisturbed ones",
+        "section 2.4 has measurement errors",
+    )
+
+
+class Vehicle(Section, name="vehicle"):
+    """The vehicle's way during the scan, and what imaging is told of it."""
+
+    forward_speed_m_per_s: float = key(
+        "constant speed ahead during the scan", "section 1, without a figure", ge=0, le=60
+    )
+    scan_duration_s: float = key(
+        "time from the first antenna position to the last; only a moving vehicle feels it",
+        "section 1, without a figure",
+        gt=0,
+        le=60,
+    )
+    speed_correction: Literal["none", "exact", "sensor"] = key(
+        "the speed that imaging is told: zero, the true one, or that of the speed sensor",
+        "section 1",
+    )
+    speed_error_m_per_s: float = key(
+        "standard deviation of the sensor's error, normal and constant during a scan",
+        "not given",
+        ge=0,
+        le=60,
+    )
 
 
 def errors(
@@ -299,3 +361,73 @@ def sufficient_error(errors: Floats, spread: Floats, *, factor: float) -> float:
         return float("inf")
     last = int(beyond[0])
     return float(np.interp(limit, spread[last - 1 : last + 1], errors[last - 1 : last + 1]))
+
+
+def _displaced(products: Products, study: Study, affected: str) -> xr.Dataset:
+    options = study.motion
+    if options.affects != affected or options.level_wavelengths == 0:
+        return products["trajectory"]
+
+    def draw(channel: int, positions: int) -> Floats:
+        return errors(
+            positions,
+            std_m=options.level_wavelengths
+            * waveform.wavelength(waveform.carrier(waveform.sampled(study.radar))),
+            distribution=options.distribution,
+            spectrum=options.spectrum,
+            cycles_per_aperture=options.cycles_per_aperture,
+            rng=randomness.generator(
+                study, Draw.MOTION, channel if options.channels == "independent" else 0
+            ),
+        )
+
+    return displace(products["trajectory"], axis=options.axis, draw=draw)
+
+
+def _true_trajectory(products: Products, study: Study) -> xr.Dataset:
+    return advance(
+        _displaced(products, study, "true"),
+        speed_m_per_s=study.vehicle.forward_speed_m_per_s,
+        duration_s=study.vehicle.scan_duration_s,
+    )
+
+
+def told_speed(study: Study) -> float:
+    """Return the speed that imaging is told, m/s."""
+    options = study.vehicle
+    if options.speed_correction == "none":
+        return 0.0
+    if options.speed_correction == "exact":
+        return options.forward_speed_m_per_s
+    # ASSUME: The sensor's error is normal and constant during a scan. One draw a realization,
+    # whatever the speed and the error's size.
+    error = options.speed_error_m_per_s * randomness.generator(study, Draw.SPEED).standard_normal()
+    return options.forward_speed_m_per_s + float(error)
+
+
+def _recorded_trajectory(products: Products, study: Study) -> xr.Dataset:
+    return advance(
+        _displaced(products, study, "recorded"),
+        speed_m_per_s=told_speed(study),
+        duration_s=study.vehicle.scan_duration_s,
+    )
+
+
+STAGES = {
+    "true_trajectory": Stage(
+        _true_trajectory,
+        inputs=("trajectory",),
+        sections=(
+            *randomness.KEYS,
+            *waveform.KEYS,
+            "motion",
+            "vehicle.forward_speed_m_per_s",
+            "vehicle.scan_duration_s",
+        ),
+    ),
+    "recorded_trajectory": Stage(
+        _recorded_trajectory,
+        inputs=("trajectory",),
+        sections=(*randomness.KEYS, *waveform.KEYS, "motion", "vehicle"),
+    ),
+}

@@ -2,21 +2,94 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from vinsar.foundations import variables
-from vinsar.radar import aperture, geometry
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
+from vinsar.foundations.stage import Stage
+from vinsar.radar import aperture, geometry, grid
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 
-def planned(radar: config.Radar) -> xr.Dataset:
+KEYS = (
+    "radar.system",
+    "radar.aperture_length_m",
+    "radar.position_spacing_m",
+    "radar.rail_height_m",
+    "radar.baseline_m",
+    "radar.baseline_angle_deg",
+    "radar.transmitter_x_m",
+    "radar.transmitter_y_m",
+    "radar.transmitter_height_m",
+)
+"""Keys of the configuration that give the antenna positions."""
+
+ANTENNAS = {
+    "transmitter": variables.Variable(
+        ("channel", "position", "axis"), "real", "m", "position of the transmitting antenna"
+    ),
+    "receiver": variables.Variable(
+        ("channel", "position", "axis"), "real", "m", "position of the receiving antenna"
+    ),
+}
+"""Variables of a product with antenna positions."""
+
+variables.declare("trajectory", ANTENNAS)
+
+
+class Radar(Section, name="radar"):
+    """The radar and its antennas (Table 1)."""
+
+    system: Literal["rail", "transmit_pair", "receive_pair"] = key(
+        "antenna arrangement: a cart with both antennas on a roof rail, or switched arrays in its "
+        "place: one receives and transmitters stand at two heights, or two receive at two heights "
+        "and one transmitter stands",
+        "section 1",
+    )
+    start_frequency_hz: float = key("lowest frequency", "Table 1", gt=0)
+    stop_frequency_hz: float = key("highest frequency", "Table 1", gt=0)
+    frequency_count: int = key("number of frequencies, evenly spaced", "not given", ge=2)
+    aperture_length_m: float = key(
+        "length of the aperture along x: of the rail or the array", "Table 1", gt=0
+    )
+    position_spacing_m: float = key(
+        "spacing of the antenna positions, or of the array's elements", "Table 1", gt=0
+    )
+    rail_height_m: float = key(
+        "height above ground of the lower antenna on the rail, or of the array (the lower of two), "
+        "H0",
+        "not given",
+        gt=0,
+    )
+    baseline_m: float = key(
+        "distance between the antennas, the transmitters of a transmit pair, or the arrays, B",
+        "Table 1",
+        gt=0,
+    )
+    baseline_angle_deg: float = key(
+        "attitude of the baseline from horizontal, beta; 90 is vertical", "Table 1", ge=0, le=180
+    )
+    transmitter_x_m: float = key(
+        "place of an array's transmitter (the lower of two) along the array, from its middle",
+        "not given",
+    )
+    transmitter_y_m: float = key("its place ahead of the array", "not given")
+    transmitter_height_m: float = key("its height above ground", "not given", gt=0)
+    dwell_s: float = key("time for each frequency of an array's sweep", "not given", gt=0, le=1)
+
+
+def planned(radar: Radar) -> xr.Dataset:
     """Return the antenna positions of a configuration.
 
     Parameters
@@ -145,7 +218,7 @@ def switched_array(
     )
 
 
-def scan_duration(radar: config.Radar, vehicle: config.Vehicle, samples: int) -> float:
+def scan_duration(radar: Radar, vehicle: Any, samples: int) -> float:
     """Return the duration of a scan, s: the cart's on a rail, the dwell on all samples of an array.
 
     Parameters
@@ -211,3 +284,29 @@ def range_extent(
         least += np.maximum(np.maximum(low - place, place - high), 0) ** 2
         most += np.maximum(np.abs(low - place), np.abs(high - place)) ** 2
     return float(np.sqrt(least.min())), float(np.sqrt(most.max()))
+
+
+def _trajectory(products: Products, study: Study) -> xr.Dataset:
+    del products
+    return planned(study.radar)
+
+
+def _waveform(radar: Radar) -> Iterator[Fault]:
+    if radar.start_frequency_hz >= radar.stop_frequency_hz:
+        yield Fault(
+            "radar.stop_frequency_hz",
+            radar.stop_frequency_hz,
+            f"must exceed radar.start_frequency_hz, {radar.start_frequency_hz:g}",
+        )
+    half = radar.aperture_length_m / 2
+    yield from grid.check_multiple(
+        "radar.position_spacing_m", radar.position_spacing_m, -half, half, radar.position_spacing_m
+    )
+
+
+STAGES = {
+    "trajectory": Stage(_trajectory, sections=KEYS),
+}
+
+
+CHECKS = (_waveform,)

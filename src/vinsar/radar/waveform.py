@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 WindowName = Literal["rectangular", "hann", "hamming", "blackman"]
+
+KEYS = ("radar.start_frequency_hz", "radar.stop_frequency_hz", "radar.frequency_count")
+"""Keys of the configuration that give the waveform."""
 
 
 def frequencies(
@@ -45,6 +48,17 @@ def frequencies(
     if frequency_count < 2:
         raise ValueError(f"{frequency_count} frequencies make no range profile; take 2 or more")
     return np.linspace(start_frequency_hz, stop_frequency_hz, frequency_count)
+
+
+def sampled(radar: Any) -> NDArray[np.floating]:
+    """Return the frequencies of a configuration's waveform, Hz.
+
+    Parameters
+    ----------
+    radar
+        Section ``radar``.
+    """
+    return frequencies(radar.start_frequency_hz, radar.stop_frequency_hz, radar.frequency_count)
 
 
 def carrier(frequency: ArrayLike) -> float:

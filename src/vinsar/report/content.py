@@ -14,15 +14,18 @@ import numpy as np
 from vinsar.figures import FIGURES, THUMBNAILS, Thumbnail, height_error
 from vinsar.figures.drawing import sweeps, thumbnails
 from vinsar.radar import formulas, instrument
+from vinsar.radar.trajectory import Radar
 from vinsar.results import lineage
-from vinsar.study import config, pipeline
+from vinsar.study import pipeline
+from vinsar.study.composition import StudyModel
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
-SECTIONS = tuple(name for name in config.Study.model_fields if name not in {"dask", "variants"})
+SECTIONS = tuple(name for name in StudyModel.model_fields if name not in {"dask", "variants"})
 """Parts of the configuration that the report shows: not where sweeps run, nor the variants."""
 
 VERDICTS = ("reproduced", "partly", "contradicted", "undecided")
@@ -188,7 +191,7 @@ class Sources:
         The errata as Markdown, of which the report shows the table.
     """
 
-    study: config.Study
+    study: Study
     paper: Mapping[str, Any]
     products: Products
     figures: tuple[Path, ...]
@@ -289,10 +292,10 @@ def _summary(sources: Sources) -> Section:
     return Section("summary", "Summary", tuple(blocks))
 
 
-def _radar(study: config.Study) -> Section:
+def _radar(study: Study) -> Section:
     rows = []
     for name, value in study.radar:
-        info = config.Radar.model_fields[name]
+        info = Radar.model_fields[name]
         extra: Any = info.json_schema_extra
         if study.radar.system == "rail" and name in _OF_ARRAYS:
             continue
@@ -325,12 +328,12 @@ def _radar(study: config.Study) -> Section:
     )
 
 
-def _middle(study: config.Study) -> tuple[float, float]:
+def _middle(study: Study) -> tuple[float, float]:
     # Measured echoes come without a scene.
     return instrument.middle(study.imaging if study.measurement.file is not None else study.scene)
 
 
-def quantities(study: config.Study) -> list[tuple[str, str, str]]:
+def quantities(study: Study) -> list[tuple[str, str, str]]:
     """Return what follows from the radar's values, each with value and unit.
 
     Parameters
@@ -481,7 +484,7 @@ def _pictures(sources: Sources, *, only: tuple[str, ...] = ()) -> list[Block]:
     return pictures
 
 
-def _narrow(png: Path, study: config.Study) -> bool:
+def _narrow(png: Path, study: Study) -> bool:
     """Tell whether a figure has the width of one column."""
     from PIL import Image
 

@@ -20,9 +20,10 @@ from rocrate.model.computationalworkflow import ComputationalWorkflow
 from rocrate.rocrate import ROCrate
 
 import vinsar
+from vinsar.foundations.configuration import Study
 from vinsar.results import lineage, provenance, storage
 from vinsar.results.lineage import SOURCE
-from vinsar.study import config
+from vinsar.study.options import Sweep
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -70,7 +71,7 @@ class _TypedWorkflow(ComputationalWorkflow):  # type: ignore[misc]
         return {"@id": self.id, "@type": list(self.TYPES)}
 
 
-def write(folder: str | Path, study: config.Study, *, agent: str = "") -> Path:
+def write(folder: str | Path, study: Study, *, agent: str = "") -> Path:
     """Make a crate of a finished study: its metadata, its sources, and all of it in one archive.
 
     Parameters
@@ -113,7 +114,7 @@ def write(folder: str | Path, study: config.Study, *, agent: str = "") -> Path:
     return archive
 
 
-def _refuse_unsound(folder: Path, study: config.Study) -> None:
+def _refuse_unsound(folder: Path, study: Study) -> None:
     found = lineage.verify(folder, study)
     problems = [f"{name}: {text}" for name, texts in sorted(found.items()) for text in texts]
     # What is stale for it comes after what has changed.
@@ -154,7 +155,7 @@ def _copy_sources(folder: Path, own: Mapping[str, str]) -> None:
         shutil.copy(path, target)
 
 
-def _as_yaml(study: config.Study) -> str:
+def _as_yaml(study: Study) -> str:
     import yaml
 
     values = yaml.safe_dump(study.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
@@ -197,7 +198,7 @@ class _Description:
     def __init__(
         self,
         folder: Path,
-        study: config.Study,
+        study: Study,
         jobs: _Jobs,
         own: Mapping[str, str],
         agent: str,
@@ -533,7 +534,7 @@ def _kind(value: Any) -> str:
 
 def _meaning(key: str) -> str:
     """Return what a key of the configuration means, or the part of it that is declared."""
-    model: Any = config.Sweep if key.startswith("sweep.") else config.Study
+    model: Any = Sweep if key.startswith("sweep.") else Study
     meaning = ""
     for part in key.removeprefix("sweep.").split("."):
         field = getattr(model, "model_fields", {}).get(part)

@@ -20,7 +20,8 @@ from vinsar.results import provenance, storage
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+
 
 RECORDS = "records"
 # What `crate` copies into a study's folder, to be handed on with it.
@@ -239,7 +240,7 @@ class Origin:
     inputs: list[Origin] = field(default_factory=list)
 
 
-def trace(path: str | Path, study: config.Study | None = None) -> Origin:
+def trace(path: str | Path, study: Study | None = None) -> Origin:
     """Return what a result comes from, down to configuration and code.
 
     Parameters
@@ -272,7 +273,7 @@ def _study_folder(path: Path) -> Path:
 def _trace(
     path: Path,
     folder: Path,
-    study: config.Study | None,
+    study: Study | None,
     expected: str | None,
     known: dict[tuple[Path, str | None], Origin],
 ) -> Origin:
@@ -285,7 +286,7 @@ def _trace(
 def _traced(
     path: Path,
     folder: Path,
-    study: config.Study | None,
+    study: Study | None,
     expected: str | None,
     known: dict[tuple[Path, str | None], Origin],
 ) -> Origin:
@@ -339,7 +340,7 @@ def _record(path: Path, folder: Path) -> dict[str, Any] | None:
         return None
 
 
-def _differences(attributes: Mapping[str, str], study: config.Study | None) -> Iterator[str]:
+def _differences(attributes: Mapping[str, str], study: Study | None) -> Iterator[str]:
     for name, sha in json.loads(attributes["vinsar_code"]).items():
         if not Path(name).is_file():
             yield f"code {name} is gone"
@@ -366,7 +367,7 @@ def leaves(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield prefix, value
 
 
-def _current(study: config.Study, stage: str, key: str) -> Any:
+def _current(study: Study, stage: str, key: str) -> Any:
     whole = study.model_dump(mode="json")
     # A sweep's own definition stands under its name.
     whole["sweep"] = whole["sweeps"].get(stage.removeprefix("sweep "), {})
@@ -410,7 +411,7 @@ def _short(path: Path) -> str:
         return path.as_posix()
 
 
-def verify(folder: str | Path, study: config.Study | None = None) -> dict[str, list[str]]:
+def verify(folder: str | Path, study: Study | None = None) -> dict[str, list[str]]:
     """Check every result of a study.
 
     Parameters

@@ -36,7 +36,7 @@ def sources_of(*modules: str) -> list[Path]:
     Parameters
     ----------
     modules
-        Names within the package, such as ``filtering`` or ``kernels.fan``.
+        Names of modules, such as ``vinsar.processing.filtering``, or within the package.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def sources_of(*modules: str) -> list[Path]:
 
 
 def _file_of(name: str) -> Path | None:
-    place = _PACKAGE.joinpath(*name.split("."))
+    place = _PACKAGE.joinpath(*name.removeprefix(f"{vinsar.__name__}.").split("."))
     for candidate in (place.with_suffix(".py"), place / "__init__.py"):
         if candidate.is_file():
             return candidate

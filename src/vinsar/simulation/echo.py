@@ -12,15 +12,24 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from vinsar.foundations import blocks, variables
+from vinsar.foundations import blocks, randomness, variables
+from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
-from vinsar.radar import waveform
+from vinsar.foundations.randomness import Draw
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import Variable
+from vinsar.radar import trajectory, waveform
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import xarray as xr
     from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 logger = logging.getLogger(__name__)
 
@@ -29,6 +38,21 @@ MOST_ACCURATE_SPLAT_DB = -85.0
 
 Weighting = Literal["amplitude", "power"]
 _POSITIONS_PER_BLOCK = 27
+
+
+ECHO = {
+    "echo": Variable(
+        ("channel", "position", "frequency"),
+        "complex",
+        "1",
+        "stepped-frequency echo",
+        "a path R out and back gives the phase -2 pi f R / c",
+    ),
+}
+"""Variables of a product with echoes."""
+
+variables.declare("echo", ECHO)
+variables.declare("received", ECHO)
 
 
 def amplitudes(facets: xr.Dataset, reflectivity: Weighting) -> NDArray[np.floating]:
@@ -394,3 +418,127 @@ def _filled(
             f"a swath of {swath_m:.2f} m is not within the unambiguous range of {unambiguous:.2f} m"
         )
     return float(np.mean(np.abs(samples) ** 2) * unambiguous / swath_m)
+
+
+class Echo(Section, name="echo"):
+    """How the echo is simulated."""
+
+    reflectivity: Literal["amplitude", "power"] = key(
+        "what the scene's reflectivity weights: the echo's amplitude or its power", "not given"
+    )
+    occlusion: bool = key("terrain hides what lies behind it (Eqs. 8-9)", "section 2.1")
+    spreading: bool = key(
+        "amplitude falls with 1 / (transmit range x receive range), relative to the scene centre",
+        "not mentioned",
+    )
+    snr_db: float | None = key(
+        "signal-to-noise ratio in a range-compressed resolution cell; null for no noise",
+        "not mentioned",
+        ge=-40,
+        le=120,
+    )
+    coupling_db: float | None = key(
+        "power of the coupling between transmitter and receiver over the mean power of the scene, "
+        "both in a range-compressed resolution cell; null for none",
+        "future work",
+        ge=-40,
+        le=140,
+    )
+    coupling_path_m: float = key(
+        "path of the coupling inside the radar; the distance between the antennas comes to it",
+        "not given",
+        ge=0,
+    )
+    coupling_variation_db: float | None = key(
+        "what of the coupling changes at random from position to position, over the coupling; "
+        "null for none",
+        "not given",
+        ge=-140,
+        le=0,
+    )
+    accuracy_db: float = key(
+        "largest error of the fast sum against the direct one; from -85 on, many times as fast",
+        "not given",
+        ge=-200,
+        le=-40,
+    )
+
+
+def _echo(products: Products, study: Study) -> xr.Dataset:
+    return simulate(
+        products["facets"],
+        products["true_trajectory"],
+        products["visibility"] if study.echo.occlusion else None,
+        frequency=waveform.sampled(study.radar),
+        reflectivity=study.echo.reflectivity,
+        spreading=study.echo.spreading,
+        accuracy_db=study.echo.accuracy_db,
+    )
+
+
+def _received(products: Products, study: Study) -> xr.Dataset:
+    clean, options = products["echo"], study.echo
+    if options.snr_db is None and options.coupling_db is None:
+        return clean
+    # The antennas at rest: over a whole scan a vehicle in motion sees a wider swath than from any
+    # one place, and motion leaves a transmitter's distance from its receiver as it is.
+    facets, antennas = products["facets"], products["trajectory"]
+    near, far = trajectory.range_extent(
+        antennas, *_facet_extent(facets), facets["facet_position"].values[:, 2]
+    )
+
+    def rngs(purpose: Draw) -> list[np.random.Generator]:
+        return [
+            randomness.generator(study, purpose, channel)
+            for channel in range(clean.sizes["channel"])
+        ]
+
+    result = clean
+    if options.snr_db is not None:
+        result = add_noise(clean, snr_db=options.snr_db, swath_m=far - near, rngs=rngs(Draw.NOISE))
+    if options.coupling_db is not None:
+        result = add_coupling(
+            result,
+            clean,
+            antennas,
+            coupling_db=options.coupling_db,
+            path_m=options.coupling_path_m,
+            variation_db=options.coupling_variation_db,
+            swath_m=far - near,
+            rngs=rngs(Draw.COUPLING),
+        )
+    return result
+
+
+def _facet_extent(facets: xr.Dataset) -> tuple[Floats, Floats]:
+    position = facets["facet_position"].values
+    least, most = position.min(axis=0), position.max(axis=0)
+    return np.array([least[0], most[0]]), np.array([least[1], most[1]])
+
+
+STAGES = {
+    "echo": Stage(
+        _echo,
+        inputs=("facets", "true_trajectory", "visibility"),
+        sections=(
+            *waveform.KEYS,
+            "echo.reflectivity",
+            "echo.occlusion",
+            "echo.spreading",
+            "echo.accuracy_db",
+        ),
+        by_channel=True,
+        parallel=True,
+    ),
+    "received": Stage(
+        _received,
+        inputs=("echo", "facets", "trajectory"),
+        sections=(
+            *randomness.KEYS,
+            "echo.snr_db",
+            "echo.coupling_db",
+            "echo.coupling_path_m",
+            "echo.coupling_variation_db",
+        ),
+    ),
+}

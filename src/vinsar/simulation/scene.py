@@ -5,28 +5,57 @@ Only the simulated echo and the metrics may know it; the processing never does.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from math import cos, radians, sin
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
-from vinsar.foundations import variables
-from vinsar.radar import geometry
+from vinsar.foundations import randomness, variables
+from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
+from vinsar.foundations.randomness import Draw
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.radar import geometry, grid
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
 
-TerrainName = Literal["peaks", "flat"]
-
 # Tangent of 60 degrees: from here on a face is a wall, its surface more than twice its ground.
 _WALL_SLOPE = 3**0.5
+
+
+TERRAIN = {
+    "height": Variable(GRID, "real", "m", "true height above the ground plane"),
+    "reflectivity": Variable(GRID, "real", "1", "reflectivity of the scene"),
+}
+
+variables.declare(
+    "roughness",
+    {
+        "height": Variable(GRID, "real", "m", "random roughness of the ground"),
+    },
+)
+variables.declare("elevation", TERRAIN)
+variables.declare("terrain", TERRAIN)
+variables.declare(
+    "facets",
+    {
+        "facet_position": Variable(("facet", "axis"), "real", "m", "position of the facet"),
+        "reflectivity": Variable(("facet",), "real", "1", "reflectivity of the facet"),
+    },
+    coordinates={"facet": Variable(("facet",), "integer", "1", "number of the facet")},
+)
 
 
 def peaks(u: ArrayLike, v: ArrayLike) -> Floats:
@@ -59,32 +88,48 @@ def _highest_peak() -> float:
     return -float(minimize(depth, x0=(0.0, 1.6), tol=1e-12).fun)
 
 
+def _peaks(x: Floats, y: Floats, *, peak_height_m: float, **_: Any) -> Floats:
+    """Span the extent with the domain -3..3; scale it to the height of its highest top."""
+    u = 6 * (x - x[0]) / (x[-1] - x[0]) - 3
+    v = 6 * (y - y[0]) / (y[-1] - y[0]) - 3
+    return peak_height_m / _highest_peak() * peaks(u[None, :], v[:, None])
+
+
+def _flat(x: Floats, y: Floats, **_: Any) -> Floats:
+    return np.zeros((y.size, x.size))
+
+
+TERRAINS: dict[str, Callable[..., Floats]] = {"peaks": _peaks, "flat": _flat}
+"""The shapes of terrain by name: from x and y of the raster, m, and the keys of `Scene`, by
+keyword, to heights (y, x), m."""
+
+
 def terrain(
-    name: TerrainName,
+    name: str,
     *,
     x_min_m: float,
     x_max_m: float,
     y_min_m: float,
     y_max_m: float,
     spacing_m: float,
-    peak_height_m: float,
     reflectivity_offset: float,
+    **shape: Any,
 ) -> xr.Dataset:
     """Return terrain and reflectivity on a raster; between its nodes the terrain is bilinear.
 
     Parameters
     ----------
     name
-        ``peaks`` spans the extent with its domain -3..3 and is scaled so that its highest top has
-        the peak height (its deepest hollow is then -0.81 times that); ``flat`` is zero.
+        A key of `TERRAINS`. ``peaks`` is scaled so that its highest top has the peak height (its
+        deepest hollow is then -0.81 times that); ``flat`` is zero.
     x_min_m, x_max_m, y_min_m, y_max_m
         Extent, m.
     spacing_m
         Spacing of the raster, m.
-    peak_height_m
-        Height of the highest top, m.
     reflectivity_offset
         Reflectivity is the height in metres plus this.
+    shape
+        The keys of `Scene` that the shape reads, such as ``peak_height_m``.
 
     Returns
     -------
@@ -94,17 +139,14 @@ def terrain(
     Raises
     ------
     ValueError
-        If the spacing does not divide the extent, or a reflectivity is negative.
+        If there is no such terrain, the spacing does not divide the extent, or a reflectivity is
+        negative.
     """
+    if name not in TERRAINS:
+        raise ValueError(f"no terrain '{name}'; there are {', '.join(TERRAINS)}")
     x = geometry.grid_axis(x_min_m, x_max_m, spacing_m)
     y = geometry.grid_axis(y_min_m, y_max_m, spacing_m)
-    height: Floats
-    if name == "flat":
-        height = np.zeros((y.size, x.size))
-    else:
-        u = 6 * (x - x_min_m) / (x_max_m - x_min_m) - 3
-        v = 6 * (y - y_min_m) / (y_max_m - y_min_m) - 3
-        height = peak_height_m / _highest_peak() * peaks(u[None, :], v[:, None])
+    height = TERRAINS[name](x, y, **shape)
     reflectivity = height + reflectivity_offset
     if reflectivity.min() < 0:
         raise ValueError(
@@ -223,7 +265,7 @@ def _inside(part: Any, x: Floats, y: Floats) -> Flags:
     return np.asarray((across <= part.size_x_m / 2 + slack) & (along <= part.size_y_m / 2 + slack))
 
 
-def relief(part: config.SceneObject, x: Floats, y: Floats) -> Floats:
+def relief(part: SceneObject, x: Floats, y: Floats) -> Floats:
     """Return how far an object rises above the ground, or falls below it.
 
     Parameters
@@ -254,8 +296,8 @@ def furnish(
     terrain: xr.Dataset,
     roughness: xr.Dataset,
     *,
-    objects: Sequence[config.SceneObject],
-    patches: Sequence[config.Patch],
+    objects: Sequence[SceneObject],
+    patches: Sequence[Patch],
 ) -> xr.Dataset:
     """Put roughness, patches and objects on a terrain.
 
@@ -383,3 +425,303 @@ def _wall_facets(
     row, column = np.repeat(row, count), np.repeat(column, count)
     place = rng.random((2, row.size))
     return x[0] + step_x * (column + place[0]), y[0] + step_y * (row + place[1])
+
+
+class _Placed(Section):
+    """Something at a place of the scene."""
+
+    x_m: float = key("position of its centre along the rail", "ours")
+    y_m: float = key("position of its centre ahead", "ours")
+
+
+class _Rectangle(_Placed):
+    """A rectangle at a place of the scene."""
+
+    size_x_m: float = key("extent along x, before its rotation", "ours", gt=0)
+    size_y_m: float = key("extent along y, before its rotation", "ours", gt=0)
+    rotation_deg: float = key(
+        "rotation from x towards y; 0 if left out", "ours", default=0.0, ge=-180, le=180
+    )
+
+    def reach(self) -> tuple[float, float]:
+        """Return how far it reaches from its centre along x and y, m."""
+        cosine, sine = (abs(part(radians(self.rotation_deg))) for part in (cos, sin))
+        half_x, half_y = self.size_x_m / 2, self.size_y_m / 2
+        return half_x * cosine + half_y * sine, half_x * sine + half_y * cosine
+
+
+class _Disc(_Placed):
+    """A disc at a place of the scene."""
+
+    diameter_m: float = key("diameter on the ground", "ours", gt=0)
+
+    def reach(self) -> tuple[float, float]:
+        """Return how far it reaches from its centre along x and y, m."""
+        return self.diameter_m / 2, self.diameter_m / 2
+
+
+class _Object(_Placed):
+    """Something that rises above the ground or falls below it."""
+
+    reflectivity: float | None = key(
+        "its reflectivity; that of the ground beneath if left out", "ours", default=None, ge=0
+    )
+
+
+class Box(_Object, _Rectangle):
+    """A box: upright walls, a top that follows the ground beneath."""
+
+    shape: Literal["box"] = key("a box", "ours")
+    height_m: float = key("height above the ground beneath", "ours", gt=0)
+
+
+class Stump(_Object, _Disc):
+    """An upright cylinder."""
+
+    shape: Literal["stump"] = key("a stump", "ours")
+    height_m: float = key("height above the ground beneath", "ours", gt=0)
+
+
+class Mound(_Object, _Disc):
+    """A mound: the cap of a sphere."""
+
+    shape: Literal["mound"] = key("a mound", "ours")
+    height_m: float = key("height of its top above the ground beneath", "ours", gt=0)
+
+
+class Ditch(_Object, _Rectangle):
+    """A trench with upright walls."""
+
+    shape: Literal["ditch"] = key("a ditch", "ours")
+    depth_m: float = key("depth below the ground around", "ours", gt=0)
+
+
+class Pit(_Object, _Disc):
+    """A round hole with an upright wall."""
+
+    shape: Literal["pit"] = key("a pit", "ours")
+    depth_m: float = key("depth below the ground around", "ours", gt=0)
+
+
+class Patch(_Rectangle):
+    """Ground of another reflectivity, without height."""
+
+    reflectivity: float = key("its reflectivity", "section 1, without a figure", ge=0)
+
+
+SceneObject = Annotated[Box | Stump | Mound | Ditch | Pit, Field(discriminator="shape")]
+
+
+class Scene(Section, name="scene"):
+    """The true terrain: for the simulated echo and the metrics, never for the processing."""
+
+    terrain: Literal[*TERRAINS, "file"] = key(  # type: ignore[valid-type]
+        "shape of the terrain; `file` is your own (docs/own-data.md)", "section 2"
+    )
+    file: str | None = key(
+        "netCDF or GeoTIFF file with the heights of the terrain `file`; paths begin in the "
+        "repository's folder",
+        "ours",
+    )
+    origin_easting_m: float = key("easting (x) of the vehicle in the file", "ours")
+    origin_northing_m: float = key("northing (y) of the vehicle in the file", "ours")
+    heading_deg: float = key(
+        "direction ahead, clockwise from the file's y axis (grid north)", "ours", ge=-360, le=360
+    )
+    ground_height_m: float | None = key(
+        "height in the file that becomes 0, the ground plane; null for the file's own height at "
+        "the vehicle",
+        "ours",
+    )
+    peak_height_m: float = key("height of the highest top of `peaks`", "section 2", gt=0)
+    x_min_m: float = key("left edge", "section 2")
+    x_max_m: float = key("right edge", "section 2")
+    y_min_m: float = key("near edge", "section 2")
+    y_max_m: float = key("far edge", "section 2")
+    terrain_spacing_m: float = key(
+        "spacing of the raster that represents the terrain", "not given", gt=0
+    )
+    facet_size_m: float = key("side of a facet", "section 2.1, without a figure", gt=0)
+    facet_jitter: float = key(
+        "random displacement of the facets, as a fraction of the facet size (full width)",
+        "section 2.1, without a figure",
+        ge=0,
+        le=1,
+    )
+    reflectivity_offset: float = key(
+        "reflectivity is the height in metres plus this", "section 2", gt=0
+    )
+    roughness_std_m: float = key(
+        "standard deviation of the random roughness of the ground; 0 for none", "ours", ge=0
+    )
+    roughness_correlation_m: float = key(
+        "distance at which the roughness is correlated by 1/e", "ours", gt=0
+    )
+    objects: Annotated[tuple[SceneObject, ...], Field(strict=False)] = key(
+        "obstacles and holes, added to the terrain", "sections 1 and 3, without a figure"
+    )
+    patches: Annotated[tuple[Patch, ...], Field(strict=False)] = key(
+        "ground of another reflectivity, without height", "section 1, without a figure"
+    )
+
+
+ELEVATION = (
+    "terrain",
+    "file",
+    "origin_easting_m",
+    "origin_northing_m",
+    "heading_deg",
+    "ground_height_m",
+    "x_min_m",
+    "x_max_m",
+    "y_min_m",
+    "y_max_m",
+    "terrain_spacing_m",
+    "reflectivity_offset",
+)
+"""Keys of `Scene` that decide what is read from the file of a terrain."""
+
+
+def _roughness(products: Products, study: Study) -> xr.Dataset:
+    del products
+    return roughness(
+        x_min_m=study.scene.x_min_m,
+        x_max_m=study.scene.x_max_m,
+        y_min_m=study.scene.y_min_m,
+        y_max_m=study.scene.y_max_m,
+        spacing_m=study.scene.terrain_spacing_m,
+        std_m=study.scene.roughness_std_m,
+        correlation_m=study.scene.roughness_correlation_m,
+        rng=randomness.generator(study, Draw.ROUGHNESS),
+    )
+
+
+def _terrain(products: Products, study: Study) -> xr.Dataset:
+    options = study.scene
+    if options.terrain == "file":
+        ground = products["elevation"]
+    else:
+        keys = options.model_dump(exclude={"terrain", "terrain_spacing_m"})
+        ground = terrain(options.terrain, spacing_m=options.terrain_spacing_m, **keys)
+    return furnish(ground, products["roughness"], objects=options.objects, patches=options.patches)
+
+
+def _facets(products: Products, study: Study) -> xr.Dataset:
+    return facets(
+        products["terrain"],
+        facet_size_m=study.scene.facet_size_m,
+        facet_jitter=study.scene.facet_jitter,
+        rng=randomness.generator(study, Draw.JITTER),
+    )
+
+
+def _scene_raster(scene: Scene) -> Iterator[Fault]:
+    faults = list(grid.check_extent("scene", scene))
+    yield from faults
+    if faults:
+        return
+    for axis in "xy":
+        low, high = getattr(scene, f"{axis}_min_m"), getattr(scene, f"{axis}_max_m")
+        yield from grid.check_multiple(
+            "scene.terrain_spacing_m",
+            scene.terrain_spacing_m,
+            low,
+            high,
+            scene.terrain_spacing_m,
+        )
+        if scene.facet_size_m > high - low:
+            yield Fault(
+                "scene.facet_size_m", scene.facet_size_m, f"must be at most {high - low:g} m"
+            )
+    if scene.terrain_spacing_m > scene.facet_size_m:
+        yield Fault(
+            "scene.terrain_spacing_m",
+            scene.terrain_spacing_m,
+            f"must be at most the facet size, {scene.facet_size_m} m",
+        )
+    # The deepest hollow of `peaks` is 0.81 times as deep as its highest top is high.
+    least = 0.8083 * scene.peak_height_m if scene.terrain == "peaks" else 0.0
+    if scene.reflectivity_offset < least:
+        yield Fault(
+            "scene.reflectivity_offset",
+            scene.reflectivity_offset,
+            f"must be at least {least:.3f}, or the deepest hollow has a negative reflectivity",
+        )
+
+
+def _furniture(scene: Scene) -> Iterator[Fault]:
+    """Check what stands on the terrain, in a scene whose raster may be wrong itself."""
+    least = 2 * scene.terrain_spacing_m
+    if scene.roughness_std_m > 0 and scene.roughness_correlation_m < least:
+        yield Fault(
+            "scene.roughness_correlation_m",
+            scene.roughness_correlation_m,
+            f"must be at least twice scene.terrain_spacing_m, {least:g} m, or the raster loses it",
+        )
+    parts: dict[str, SceneObject | Patch] = {}
+    parts |= {f"scene.objects[{number}]": part for number, part in enumerate(scene.objects)}
+    parts |= {f"scene.patches[{number}]": part for number, part in enumerate(scene.patches)}
+    for where, part in parts.items():
+        sizes = [name for name in ("diameter_m", "size_x_m", "size_y_m") if hasattr(part, name)]
+        for size in sizes:
+            if getattr(part, size) < least:
+                yield Fault(
+                    f"{where}.{size}",
+                    getattr(part, size),
+                    f"must be at least twice scene.terrain_spacing_m, {least:g} m, or the raster "
+                    "loses it",
+                )
+        for axis, reach in zip("xy", part.reach(), strict=True):
+            near, far = (getattr(part, f"{axis}_m") + sign * reach for sign in (-1, 1))
+            first, last = getattr(scene, f"{axis}_min_m"), getattr(scene, f"{axis}_max_m")
+            if near < first or far > last:
+                yield Fault(
+                    f"{where}.{axis}_m",
+                    getattr(part, f"{axis}_m"),
+                    f"it reaches from {near:.3g} to {far:.3g} m, but must lie in the scene, "
+                    f"{axis} {first:g} to {last:g} m",
+                )
+        if isinstance(part, Mound) and part.height_m > part.diameter_m / 2:
+            yield Fault(
+                f"{where}.height_m",
+                part.height_m,
+                f"must be at most half the diameter, {part.diameter_m / 2:g} m: a mound is the cap "
+                "of a sphere",
+            )
+
+
+def _own_terrain(scene: Scene) -> Iterator[Fault]:
+    if scene.terrain == "file" and scene.file is None:
+        yield Fault("scene.file", None, "must name the file of scene.terrain 'file'")
+    if scene.terrain != "file" and scene.file is not None:
+        yield Fault(
+            "scene.file",
+            scene.file,
+            f"is not read for scene.terrain '{scene.terrain}'; take scene.terrain file, or null",
+        )
+
+
+STAGES = {
+    "roughness": Stage(
+        _roughness,
+        sections=(
+            *randomness.KEYS,
+            "scene.x_min_m",
+            "scene.x_max_m",
+            "scene.y_min_m",
+            "scene.y_max_m",
+            "scene.terrain_spacing_m",
+            "scene.roughness_std_m",
+            "scene.roughness_correlation_m",
+        ),
+    ),
+    "terrain": Stage(_terrain, inputs=("roughness",), sections=("scene",), optional=("elevation",)),
+    "facets": Stage(
+        _facets,
+        inputs=("terrain",),
+        sections=(*randomness.KEYS, "scene.facet_size_m", "scene.facet_jitter"),
+    ),
+}
+
+
+CHECKS = (_scene_raster, _furniture, _own_terrain)

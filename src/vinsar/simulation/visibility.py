@@ -7,17 +7,57 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import blocks, variables
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.radar import grid
 from vinsar.simulation import scene
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
+
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
 
 # Where the raster is coarse, the edges of shadows still are to be sharp.
 _FEWEST_RAYS = 800
+
+
+SHADOW = Variable(
+    GRID,
+    "flag",
+    "1",
+    "cell hidden from either antenna at more than half of the positions",
+    flag_meanings="visible shadow",
+)
+"""Variable of what is hidden."""
+
+variables.declare(
+    "visibility",
+    {
+        "visible": Variable(
+            ("channel", "position", "facet"),
+            "flag",
+            "1",
+            "facet seen from the transmitter and the receiver (Eq. 8)",
+            flag_meanings="hidden visible",
+        ),
+    },
+)
+variables.declare(
+    "truth",
+    {
+        "height": Variable(GRID, "real", "m", "true height on the DEM's grid"),
+        "reflectivity": Variable(GRID, "real", "1", "reflectivity on the DEM's grid"),
+        "visible_fraction": Variable(
+            ("channel", "y", "x"), "real", "1", "share of the antenna positions that see the cell"
+        ),
+        "shadow": SHADOW,
+    },
+)
 
 
 def visible_points(terrain: xr.Dataset, antennas: Floats, points: Floats) -> Flags:
@@ -160,3 +200,23 @@ def truth_on_grid(terrain: xr.Dataset, trajectory: xr.Dataset, x: Floats, y: Flo
         },
         {"x": x, "y": y},
     )
+
+
+def _visibility(products: Products, study: Study) -> xr.Dataset:
+    del study
+    return facet_visibility(products["terrain"], products["facets"], products["true_trajectory"])
+
+
+def _truth(products: Products, study: Study) -> xr.Dataset:
+    x, y = grid.image_axes(study.imaging)
+    return truth_on_grid(products["terrain"], products["true_trajectory"], x, y)
+
+
+STAGES = {
+    "visibility": Stage(
+        _visibility, inputs=("terrain", "facets", "true_trajectory"), by_channel=True, parallel=True
+    ),
+    "truth": Stage(
+        _truth, inputs=("terrain", "true_trajectory"), sections=grid.KEYS, parallel=True
+    ),
+}

@@ -15,11 +15,14 @@ import numpy as np
 
 from vinsar.foundations import variables
 from vinsar.foundations.constants import AXES, CHANNELS
-from vinsar.radar import geometry, trajectory, waveform
+from vinsar.foundations.errors import ConfigurationError, Fault
+from vinsar.radar import geometry, grid, trajectory, waveform
+from vinsar.radar.trajectory import ANTENNAS
 from vinsar.readers import elevation as surveyed
 from vinsar.results import storage
 from vinsar.simulation import scene
-from vinsar.study import config, pipeline, validation
+from vinsar.simulation.echo import ECHO
+from vinsar.study import validation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -27,10 +30,16 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
+    from vinsar.foundations.configuration import Study
+    from vinsar.processing.focusing import Imaging
+    from vinsar.simulation.scene import Scene
+
     Floats = NDArray[np.floating]
     Antennas = tuple[Floats, Floats]
 
 logger = logging.getLogger(__name__)
+
+variables.declare("measurement", ECHO | ANTENNAS)
 
 _HERTZ = ("Hz", "hertz", "Hertz", "s-1", "1/s")
 
@@ -42,7 +51,7 @@ _UNEVEN = 1e-3
 _OFF_ORIGIN_M = 1.0
 
 
-def load(*paths: str | Path) -> config.Study:
+def load(*paths: str | Path) -> Study:
     """Read configuration files as `validation.load` does, with what a measurement adds to them.
 
     Parameters
@@ -52,7 +61,7 @@ def load(*paths: str | Path) -> config.Study:
 
     Returns
     -------
-    config.Study
+    Study
         The checked configuration.
 
     Raises
@@ -63,7 +72,7 @@ def load(*paths: str | Path) -> config.Study:
     return check(validation.read(*paths))
 
 
-def check(raw: Mapping[str, Any]) -> config.Study:
+def check(raw: Mapping[str, Any]) -> Study:
     """Check a configuration; a measurement's file takes the place of the section ``radar``.
 
     Parameters
@@ -73,7 +82,7 @@ def check(raw: Mapping[str, Any]) -> config.Study:
 
     Returns
     -------
-    config.Study
+    Study
         The checked configuration, whose radar is that of the measurement, if it has one.
 
     Raises
@@ -95,7 +104,7 @@ def check(raw: Mapping[str, Any]) -> config.Study:
     return study
 
 
-def read(study: config.Study) -> dict[str, xr.Dataset]:
+def read(study: Study) -> dict[str, xr.Dataset]:
     """Read the products that a study takes from files (`pipeline.from_files`).
 
     Parameters
@@ -120,7 +129,7 @@ def read(study: config.Study) -> dict[str, xr.Dataset]:
     return {}
 
 
-def elevation(options: config.Scene, *, antenna_height_m: float) -> xr.Dataset:
+def elevation(options: Scene, *, antenna_height_m: float) -> xr.Dataset:
     """Read a file of heights and bring them onto the scene's raster.
 
     Parameters
@@ -242,7 +251,7 @@ def _blaming(key: str, path: str) -> Iterator[None]:
         if not isinstance(error, ValueError):
             why = sentence.partition("\n")[0]
             sentence = f"is truncated or of another format ({why}); write or copy it anew"
-        raise validation.ConfigurationError([validation.Fault(key, path, sentence)]) from error
+        raise ConfigurationError([Fault(key, path, sentence)]) from error
 
 
 @contextmanager
@@ -350,21 +359,21 @@ def _refuse_misplaced(antennas: Antennas, near_edge_m: float) -> None:
             )
 
 
-def _refuse_ambiguous(frequency: Floats, antennas: Antennas, imaging: config.Imaging) -> None:
+def _refuse_ambiguous(frequency: Floats, antennas: Antennas, imaging: Imaging) -> None:
     trajectory_ = variables.dataset(
         "trajectory", dict(zip(("transmitter", "receiver"), antennas, strict=True))
     )
-    _, far = trajectory.range_extent(trajectory_, *pipeline.image_axes(imaging))
+    _, far = trajectory.range_extent(trajectory_, *grid.image_axes(imaging))
     step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
     unambiguous = waveform.unambiguous_range(step)
     if far > unambiguous:
-        fault = validation.Fault(
+        fault = Fault(
             "imaging.y_max_m",
             imaging.y_max_m,
             f"its farthest slant range of {far:.2f} m must be within the unambiguous range of the "
             f"measurement, {unambiguous:.2f} m",
         )
-        raise validation.ConfigurationError([fault])
+        raise ConfigurationError([fault])
 
 
 def _declared(

@@ -1,6 +1,6 @@
-"""The configuration's reference page and its schema, generated from the models.
+"""The configuration's reference page and its JSON schema, generated from the models.
 
-``python -m vinsar.study.reference config`` writes ``README.md`` and ``schema.json`` there.
+``python -m vinsar.study.reference config`` writes ``README.md`` there.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
-from vinsar.study import config
+from vinsar.foundations.configuration import models_in
+from vinsar.study.composition import StudyModel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,13 +26,14 @@ _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 _HEAD = """\
 # Configuration
 
-Generated from `src/vinsar/config.py`; do not edit.
-`.venv/bin/python -m vinsar.study.reference config` makes it anew.
+Generated from the sections that the modules in `src/vinsar` declare; do not edit.
+`.venv/bin/python -m vinsar.study.reference config` writes it again.
 
 `paper.yaml` holds every key with the paper's value. Another study holds only what differs, its
 name `study` among it, and runs with `./run --configfile config/<name>.yaml`. Units stand in the
 names. What is wrong, unknown or physically impossible is refused before anything runs, all of it
-in one message. An editor that knows JSON schemas completes and checks the keys with `schema.json`.
+in one message. An editor that knows JSON schemas completes and checks the keys: `./run schema >
+config/schema.json`.
 """
 
 
@@ -48,7 +50,8 @@ def markdown(defaults: Mapping[str, Any]) -> str:
     str
         A table a section, in Markdown.
     """
-    fields = config.Study.model_fields
+    # In the order of paper.yaml, not in that of the folders.
+    fields = {name: StudyModel.model_fields[name] for name in defaults}
     plain = [(name, field) for name, field in fields.items() if not _is_model(field.annotation)]
     parts = [_HEAD, "## Study\n", _section(plain, defaults)]
     for name, field in fields.items():
@@ -120,12 +123,12 @@ def _is_model(annotation: Any) -> bool:
 
 def _inner_models(annotation: Any) -> list[type[BaseModel]]:
     """Return the models that a list or mapping holds."""
-    return [] if _is_model(annotation) else config.models_in(annotation)
+    return [] if _is_model(annotation) else models_in(annotation)
 
 
 def schema() -> str:
     """Return the JSON schema of a study's overrides: every key known, none required."""
-    document = config.Study.model_json_schema()
+    document = StudyModel.model_json_schema()
 
     def relax(node: Any) -> None:
         if isinstance(node, dict):
@@ -143,12 +146,11 @@ def schema() -> str:
 
 
 def write(folder: Path) -> None:
-    """Write ``README.md`` and ``schema.json`` beside ``paper.yaml``."""
+    """Write ``README.md`` beside ``paper.yaml``."""
     import yaml
 
     defaults = yaml.safe_load((folder / "paper.yaml").read_text(encoding="utf-8"))
     (folder / "README.md").write_text(markdown(defaults), encoding="utf-8")
-    (folder / "schema.json").write_text(schema(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from vinsar.sweeps import processes
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from vinsar.study import config
+    from vinsar.study.options import Dask
     from vinsar.sweeps.processes import Function, Lost, Receive
 
     Compute = Callable[[Function, list[Any], Receive, Lost], None]
@@ -27,7 +27,7 @@ _AT_A_TIME = 2
 
 
 @contextmanager
-def workers(options: config.Dask, count: int) -> Iterator[Compute]:
+def workers(options: Dask, count: int) -> Iterator[Compute]:
     """Give a function that runs another on blocks in parallel.
 
     Parameters

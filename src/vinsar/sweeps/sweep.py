@@ -20,13 +20,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from vinsar.evaluation import detection_accuracy
+from vinsar.evaluation import accuracy, detection_accuracy, point_response
 from vinsar.foundations import blocks, variables
-from vinsar.foundations.constants import CHANNELS
-from vinsar.study import config, pipeline, validation
+from vinsar.foundations.configuration import Study, swept_section
+from vinsar.foundations.constants import CHANNELS, REGIONS
+from vinsar.foundations.errors import ConfigurationError, Fault
+from vinsar.foundations.variables import Variable
+from vinsar.study import pipeline, validation
+from vinsar.study.composition import StudyModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
+
+    from vinsar.foundations.stage import Products, Stage
+    from vinsar.simulation.scene import Scene
+    from vinsar.study.options import Sweep
 
     Row = dict[str, Any]
     Results = tuple[dict[str, Row], dict[str, str]]
@@ -44,6 +52,20 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+SWEEP: dict[str, Variable] = {
+    name: variable
+    for name, variable in accuracy.VARIABLES.items()
+    if variable.dims == ("region",) and name != "cell_count"
+} | {
+    "coherence": Variable((), "real", "1", "median coherence on visible ground"),
+    "residues": Variable((), "integer", "1", "residues of the filtered phase"),
+    **point_response.VARIABLES,
+}
+"""Variables of a sweep; the dimensions of the swept keys and of the realization come first."""
+
+SWEEP_OF_OBJECTS: dict[str, Variable] = SWEEP | detection_accuracy.VARIABLES
+"""Variables of a sweep over a scene with objects."""
+
 CASES_PER_BLOCK = 15
 """Cases that a worker takes at a time, and at most loses when it dies."""
 
@@ -57,7 +79,7 @@ _SMALL_BYTES = 1 << 16
 
 _RESULTS = ("accuracy", "interferogram", "unwrapped", "focus", "truth")
 _OF_OBJECTS = "detection_accuracy"
-_STATISTICS = tuple(name for name, own in variables.SWEEP.items() if own.dims == ("region",))
+_STATISTICS = tuple(name for name, own in SWEEP.items() if own.dims == ("region",))
 # Units by the ends of keys; UDUNITS knows the decibel by this name alone.
 UNITS = {
     "m_per_s": "m s-1", "m": "m", "s": "s", "hz": "Hz", "db": "0.1 lg(re 1)", "deg": "degree",
@@ -86,7 +108,7 @@ class Case:
 
     index: tuple[int, ...]
     changes: dict[str, Any]
-    study: config.Study
+    study: Study
     key: str
 
     def __str__(self) -> str:
@@ -106,16 +128,33 @@ def _text(value: Any) -> str:
     return json.dumps(value, sort_keys=True, default=str)
 
 
-def _results(scene: config.Scene) -> tuple[str, ...]:
-    """Return the products that a case is judged by: how well objects are found, if it has any."""
+def results(study: Study, name: str) -> tuple[str, ...]:
+    """Return the products that a sweep's cases are judged by.
+
+    Parameters
+    ----------
+    study
+        The study that the sweep belongs to.
+    name
+        Name of the sweep.
+
+    Returns
+    -------
+    tuple of str
+        Names of products; how well objects are found is among them if the scene has any.
+    """
+    return _judged_by(swept_section(study, name, "scene"))
+
+
+def _judged_by(scene: Scene) -> tuple[str, ...]:
     return (*_RESULTS, _OF_OBJECTS) if scene.objects else _RESULTS
 
 
-def _stages(study: config.Study, name: str) -> dict[str, pipeline.Stage]:
-    return pipeline.needed(_results(config.swept_section(study, name, "scene")))
+def _stages(study: Study, name: str) -> dict[str, Stage]:
+    return pipeline.needed(results(study, name))
 
 
-def declared(study: config.Study, name: str) -> list[str]:
+def declared(study: Study, name: str) -> list[str]:
     """Return every key of the configuration that the stages of a sweep's cases declare.
 
     Parameters
@@ -134,7 +173,7 @@ def declared(study: config.Study, name: str) -> list[str]:
     return list(dict.fromkeys(key for stage in stages for key in stage.sections))
 
 
-def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config.Study]]:
+def studies(study: Study, name: str) -> list[tuple[dict[str, Any], Study]]:
     """Return a sweep's studies, all checked, each with its swept keys and their values.
 
     Parameters
@@ -160,7 +199,7 @@ def studies(study: config.Study, name: str) -> list[tuple[dict[str, Any], config
     ]
 
 
-def cases(study: config.Study, name: str, *given: str) -> list[Case]:
+def cases(study: Study, name: str, *given: str) -> list[Case]:
     """Return a sweep's cases, those that share their first stages next to each other.
 
     Parameters
@@ -204,7 +243,7 @@ def cases(study: config.Study, name: str, *given: str) -> list[Case]:
     return [case for _, case in found]
 
 
-def _refuse_idle(study: config.Study, name: str) -> None:
+def _refuse_idle(study: Study, name: str) -> None:
     """Refuse swept keys that no stage of a case reads, and values that stand there twice."""
     faults = []
     read = [f"{key}." for key in declared(study, name)]
@@ -212,31 +251,31 @@ def _refuse_idle(study: config.Study, name: str) -> None:
         where = f"sweeps.{name}.over.{key}"
         if key == "realization":
             advice = f"is counted by sweeps.{name}.realizations; take it out of `over`"
-            faults.append(validation.Fault(where, None, advice))
+            faults.append(Fault(where, None, advice))
         elif key == "scene.objects":
             advice = (
                 "must be the same in all cases; put them into scene.objects or the sweep's base"
             )
-            faults.append(validation.Fault(where, None, advice))
+            faults.append(Fault(where, None, advice))
         # A key that is not there at all is for the check of the cases, which says what was meant.
         elif key in validation.every_key() and not any(
             f"{key}.".startswith(part) or part.startswith(f"{key}.") for part in read
         ):
             advice = "no stage of a case reads it, so all its values would give the same result"
-            faults.append(validation.Fault(where, None, advice))
+            faults.append(Fault(where, None, advice))
         count = Counter(_text(float(v) if _is_number(v) else v) for v in values)
         twice = [text for text, times in count.items() if times > 1]
         if twice:
-            faults.append(validation.Fault(where, ", ".join(twice), "stands there more than once"))
+            faults.append(Fault(where, ", ".join(twice), "stands there more than once"))
     if faults:
-        raise validation.ConfigurationError(faults)
+        raise ConfigurationError(faults)
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _share(case: config.Study, study: config.Study) -> config.Study:
+def _share(case: Study, study: Study) -> Study:
     """Return a case that holds the study's own sections where they are equal: less memory."""
     same = {name: getattr(study, name) for name in type(study).model_fields}
     return case.model_copy(
@@ -303,9 +342,7 @@ class Memo:
         with self._lock:
             return {name: len(products) for name, products in self._kept.items()}
 
-    def products(
-        self, names: Iterable[str], study: config.Study, given: Given | None = None
-    ) -> pipeline.Products:
+    def products(self, names: Iterable[str], study: Study, given: Given | None = None) -> Products:
         """Return products for a study, computing only what is neither given nor kept."""
         with self._lock:
             self._active += 1
@@ -316,9 +353,7 @@ class Memo:
             with self._lock:
                 self._active -= 1
 
-    def _products(
-        self, wanted: tuple[str, ...], study: config.Study, given: Given
-    ) -> pipeline.Products:
+    def _products(self, wanted: tuple[str, ...], study: Study, given: Given) -> Products:
         made = {name: _Product([product]) for name, product in given.items()}
         stages = pipeline.needed(wanted)
         values = study.values({name for stage in stages.values() for name in stage.sections})
@@ -350,7 +385,7 @@ class Memo:
         name: str,
         setting: str,
         inputs: Mapping[str, tuple[xr.Dataset, str]],
-        compute: Callable[[pipeline.Products], xr.Dataset],
+        compute: Callable[[Products], xr.Dataset],
     ) -> _Product:
         key = _digest(name, setting, *(origin for _, origin in inputs.values()))
         with self._lock:
@@ -375,10 +410,8 @@ class Memo:
         return future.result()
 
 
-def _compute(
-    stage: pipeline.Stage, setting: dict[str, Any], products: pipeline.Products
-) -> xr.Dataset:
-    return stage.compute(products, config.Study.part(setting))
+def _compute(stage: Stage, setting: dict[str, Any], products: Products) -> xr.Dataset:
+    return stage.compute(products, StudyModel.part(setting))
 
 
 def _identity(product: xr.Dataset, origin: str) -> str:
@@ -424,7 +457,7 @@ def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -
     """
     memo = memo or _MEMO
     with blocks.serially():
-        products = memo.products(_results(case.study.scene), case.study, given)
+        products = memo.products(_judged_by(case.study.scene), case.study, given)
     accuracy, interferogram, unwrapped, focus, truth = (products[name] for name in _RESULTS)
     row: Row = {name: accuracy[name].values.tolist() for name in _STATISTICS}
     visible = ~truth["shadow"].values
@@ -448,7 +481,7 @@ def _run_block(given: Given, block: list[Case]) -> Results:
 
 
 def run(
-    study: config.Study,
+    study: Study,
     name: str,
     *,
     finished: Mapping[str, Row],
@@ -532,7 +565,7 @@ def dimension(key: str) -> str:
     return key.replace(".", "_")
 
 
-def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Row]) -> xr.Dataset:
+def _assemble(sweep: Sweep, everything: list[Case], rows: Mapping[str, Row]) -> xr.Dataset:
     shape = [*(len(values) for values in sweep.over.values()), sweep.realizations]
     names = list(rows[everything[0].key])
     data: dict[str, Any] = {}
@@ -557,4 +590,70 @@ def _assemble(sweep: config.Sweep, everything: list[Case], rows: Mapping[str, Ro
             "amplitude_threshold": detection_accuracy.AMPLITUDE_THRESHOLDS,
             "object": np.arange(data["object_height"].shape[-1]),
         }
-    return variables.sweep_dataset(data, swept, coords)
+    return sweep_dataset(data, swept, coords)
+
+
+def sweep_dataset(
+    data: Mapping[str, Any],
+    swept: Mapping[str, tuple[Any, dict[str, str]]],
+    coords: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """Make a sweep's product.
+
+    Parameters
+    ----------
+    data
+        An array for each variable of `SWEEP`, or of `SWEEP_OF_OBJECTS`: swept keys, realization,
+        then its own dimensions.
+    swept
+        Values and attributes of each swept key's dimension, in order.
+    coords
+        The coordinates' values of dimensions that are neither region nor channel.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``sweep``.
+    """
+    result = xr.Dataset()
+    leading = (*swept, "realization")
+    for name, values in data.items():
+        variable = SWEEP_OF_OBJECTS[name]
+        result[name] = ((*leading, *variable.dims), values, variable.attrs)
+    for name, (labels, attrs) in swept.items():
+        result = result.assign_coords({name: (name, labels, attrs)})
+    own = {
+        "realization": np.arange(result.sizes["realization"]),
+        "region": np.array(REGIONS),
+        "channel": np.array(CHANNELS),
+        "ground_axis": np.array(variables.LABELS["ground_axis"]),
+    }
+    for name, labels in (own | dict(coords or {})).items():
+        result = result.assign_coords({name: (name, labels, variables.COORDINATES[name].attrs)})
+    return result
+
+
+def _check_sweep(data: xr.Dataset) -> None:
+    found = {str(name) for name in data.data_vars}
+    declared = SWEEP_OF_OBJECTS if found - set(SWEEP) else SWEEP
+    if found != set(declared):
+        raise ValueError(
+            f"product 'sweep' holds {sorted(found)}, but {sorted(declared)} are declared"
+        )
+    for name, variable in declared.items():
+        dims = data[name].dims
+        own = len(variable.dims)
+        if dims[len(dims) - own :] != variable.dims or "realization" not in dims:
+            raise ValueError(
+                f"'{name}' of product 'sweep' has the dimensions {dims}, but the swept keys, "
+                f"realization and {variable.dims} are declared"
+            )
+        for attribute, value in variable.attrs.items():
+            if data[name].attrs.get(attribute) != value:
+                raise ValueError(
+                    f"'{name}' of product 'sweep' has {attribute}="
+                    f"{data[name].attrs.get(attribute)!r}, but {value!r} is declared"
+                )
+
+
+variables.declare("sweep", {}, check=_check_sweep)

@@ -11,12 +11,10 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from vinsar.study import config
+    from vinsar.foundations.configuration import Study
 
 
-def evaluate(
-    study: config.Study, given: Mapping[str, xr.Dataset] | None = None
-) -> dict[str, xr.Dataset]:
+def evaluate(study: Study, given: Mapping[str, xr.Dataset] | None = None) -> dict[str, xr.Dataset]:
     """Run a study and its variants.
 
     Parameters

@@ -17,8 +17,9 @@ from matplotlib.text import Text
 from vinsar import figures
 from vinsar.evaluation import detection_accuracy
 from vinsar.figures.drawing import style
-from vinsar.foundations import variables
-from vinsar.study import config, pipeline
+from vinsar.study import pipeline
+from vinsar.study.composition import StudyModel
+from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
 CONFIG = Path(__file__).parents[3] / "config"
 EXTENT = {"x_min_m": -0.8, "x_max_m": 0.8, "y_min_m": 10.0, "y_max_m": 12.0}
@@ -58,7 +59,7 @@ def make_study():
             values["sweeps"] = others | values["sweeps"]
         for name, section in sections.items():
             values[name] |= section
-        return config.Study.model_validate(values)
+        return StudyModel.model_validate(values)
 
     return make
 
@@ -95,7 +96,7 @@ def make_sweep():
         shares = {"coherence", "point_gain", "peak_gain"}
         trailing = {"region": (1.0, 0.4, 2.0), "channel": (1.0, 0.9), "ground_axis": (1.0, 0.1)}
         data = {}
-        for name, variable in variables.SWEEP.items():
+        for name, variable in SWEEP.items():
             one = 1 / (1 + 20 * std) if name in shares else std
             for dim in variable.dims:
                 one = one[..., None] * np.asarray(trailing[dim])
@@ -107,7 +108,7 @@ def make_sweep():
             )
             for key, values in over.items()
         }
-        return variables.sweep_dataset(data, swept)
+        return sweep_dataset(data, swept)
 
     return make
 
@@ -138,7 +139,7 @@ def with_detections(sweep):
     data |= {str(name): values.values for name, values in sweep.data_vars.items()}
     coords = {"height_threshold": heights, "amplitude_threshold": ratios, "object": np.arange(2)}
     swept = {key: (sweep[key].values, {"long_name": "roughness"})}
-    return variables.sweep_dataset(data, swept, coords)
+    return sweep_dataset(data, swept, coords)
 
 
 class OnlySections:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vinsar.radar import baseline
+from vinsar.evaluation import baseline_errors
 
 
 def test_baseline_angle_shows_draws_and_formulas(draw, lines_of, products, study):
@@ -20,4 +20,4 @@ def test_baseline_angle_shows_draws_and_formulas(draw, lines_of, products, study
     }
     for name, line in shown.items():
         np.testing.assert_allclose(line.get_ydata(), 1000 * product[name], err_msg=name)
-        np.testing.assert_allclose(line.get_xdata(), baseline.ANGLES_DEG)
+        np.testing.assert_allclose(line.get_xdata(), baseline_errors.ANGLES_DEG)

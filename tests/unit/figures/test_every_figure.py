@@ -15,7 +15,9 @@ import pytest
 
 from vinsar import figures
 from vinsar.figures.drawing import style, thumbnails
-from vinsar.study import config, pipeline, validation
+from vinsar.foundations.errors import ConfigurationError
+from vinsar.study import pipeline, validation
+from vinsar.study.composition import StudyModel
 
 PAPER = Path(__file__).parents[3] / "config" / "paper.yaml"
 NAMES = list(figures.FIGURES)
@@ -33,7 +35,7 @@ def test_every_module_of_the_folder_declares_figures_that_read_what_there_is(stu
     for figure in figures.FIGURES.values():
         assert set(figure.inputs) <= set(pipeline.STAGES)
         assert set(figure.sweeps) <= set(study.sweeps)
-        assert set(figure.sections) <= set(config.Study.model_fields)
+        assert set(figure.sections) <= set(StudyModel.model_fields)
         assert "figures" in figure.sections
         assert figure.title
         assert figure.caption.endswith(".")
@@ -189,7 +191,7 @@ def test_figures_that_cannot_be_drawn_are_refused_before_anything_runs(make_stud
     asked = ["fig1", "fig9", "fig5", "fig1"]
     study = make_study(outputs={"figures": asked, "claims": False})
     study = study.model_copy(update={"sweeps": {}})
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         figures.check(study, pipeline.STAGES)
     keys = [fault.key for fault in caught.value.faults]
     assert keys == [f"outputs.figures[{number}]" for number in (1, 2, 3)]
@@ -202,7 +204,7 @@ def test_measured_echoes_have_the_figures_that_need_no_truth(make_study):
         outputs={"figures": ["measured", "fig1", "fig4", "snr"], "claims": False},
     )
     known = {*pipeline.stages(study), *pipeline.from_files(study)}
-    with pytest.raises(validation.ConfigurationError) as caught:
+    with pytest.raises(ConfigurationError) as caught:
         figures.check(study, known)
     assert [fault.value for fault in caught.value.faults] == ["fig1", "fig4", "snr"]
     for fault in caught.value.faults:

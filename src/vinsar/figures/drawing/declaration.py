@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
     import matplotlib.figure
 
-    from vinsar.study import config
-    from vinsar.study.pipeline import Products
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,11 +40,11 @@ class Figure:
         all panels of a sheet are drawn together.
     """
 
-    draw: Callable[[Products, config.Study], matplotlib.figure.Figure]
+    draw: Callable[[Products, Study], matplotlib.figure.Figure]
     title: str
     caption: str
     sections: tuple[str, ...]
     inputs: tuple[str, ...] = ()
     sweeps: tuple[str, ...] = ()
-    numbers: Callable[[Products, config.Study], str] | None = None
+    numbers: Callable[[Products, Study], str] | None = None
     sheet: str = ""

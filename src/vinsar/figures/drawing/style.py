@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.ticker import Locator
 
-    from vinsar.study import config
+    from vinsar.study.options import Figures
+
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -85,13 +86,13 @@ FONTS: dict[str, dict[str, Any]] = {
 
 _IN_POINTS = tuple(key for key in STYLE if key.endswith(("size", "pad", "width")))
 
-_options: ContextVar[config.Figures | None] = ContextVar("_options", default=None)
+_options: ContextVar[Figures | None] = ContextVar("_options", default=None)
 # What each figure was made with, and its size over that in the layout.
-_OF_FIGURE: WeakKeyDictionary[Figure, tuple[config.Figures | None, float]] = WeakKeyDictionary()
+_OF_FIGURE: WeakKeyDictionary[Figure, tuple[Figures | None, float]] = WeakKeyDictionary()
 
 
 @contextmanager
-def applied(options: config.Figures | None = None) -> Iterator[None]:
+def applied(options: Figures | None = None) -> Iterator[None]:
     """Apply the style within the block, whatever the user's own settings are, and undo it after.
 
     Parameters
@@ -114,7 +115,7 @@ def applied(options: config.Figures | None = None) -> Iterator[None]:
         _options.reset(token)
 
 
-def text_scale(options: config.Figures | None) -> float:
+def text_scale(options: Figures | None) -> float:
     """Return the size of text over that of the layout."""
     return 1.0 if options is None else options.font_size_pt / FONT_SIZE_PT
 
@@ -183,7 +184,7 @@ def new_figure(width_mm: float, height_mm: float) -> Figure:
     return figure
 
 
-def options_of(figure: Figure) -> config.Figures | None:
+def options_of(figure: Figure) -> Figures | None:
     """Return the options that a figure was made with."""
     return _OF_FIGURE.get(figure, (None, 1.0))[0]
 

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.figures.drawing import style
+from vinsar.foundations.configuration import swept_section
 from vinsar.radar import instrument
-from vinsar.study import config
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
 
     Floats = NDArray[np.floating]
 
@@ -157,15 +159,14 @@ def around(*values: Any, low: float = 0.75, high: float = 1.35) -> tuple[float, 
     return float(known.min()) * low, float(known.max()) * high
 
 
-def looks(study: config.Study, sweep: str) -> float:
+def looks(study: Study, sweep: str) -> float:
     """Return the independent looks in the coherence window of a sweep's cases, at least 1.
 
     The window's area over that of a resolution cell in the middle of the scene. It stands for the
     averaging of the phase filter, which has no window of its own.
     """
     radar, scene, imaging, interferogram = (
-        config.swept_section(study, sweep, name)
-        for name in ("radar", "scene", "imaging", "interferogram")
+        swept_section(study, sweep, name) for name in ("radar", "scene", "imaging", "interferogram")
     )
     side = interferogram.coherence_window_px * imaging.grid_spacing_m
     planned = instrument.Instrument.planned(radar)

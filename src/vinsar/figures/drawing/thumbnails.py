@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from vinsar.study import config
+    from vinsar.study.options import Figures
+
 
 _WIDTH_MM, _HEIGHT_MM = 42.0, 34.0
 _DPI = 170
@@ -36,10 +37,10 @@ class Thumbnail:
     """
 
     shows: str
-    draw: Callable[[Axes, xr.Dataset, config.Figures], object] | None = None
+    draw: Callable[[Axes, xr.Dataset, Figures], object] | None = None
 
 
-def png(thumbnail: Thumbnail, product: xr.Dataset, options: config.Figures) -> bytes | None:
+def png(thumbnail: Thumbnail, product: xr.Dataset, options: Figures) -> bytes | None:
     """Draw the small picture of a product.
 
     Parameters
@@ -77,7 +78,7 @@ def raster(axes: Axes, data: xr.DataArray, colormap: Any, low: float, high: floa
     axes.imshow(data.values, cmap=colormap, aspect="equal", vmin=low, vmax=high)
 
 
-def heights(axes: Axes, data: xr.DataArray, options: config.Figures) -> None:
+def heights(axes: Axes, data: xr.DataArray, options: Figures) -> None:
     """Draw heights in the colours of heights."""
     raster(axes, data, style.colormap(options.height_colormap), *ends(data.values))
 

@@ -1,0 +1,50 @@
+"""What a stage of the chain is: what it reads, which keys it depends on, what it computes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import xarray as xr
+
+    from vinsar.foundations.configuration import Study
+
+Products = dict[str, "xr.Dataset"]
+"""Products by name."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of the chain, declared in the module whose function it is.
+
+    Attributes
+    ----------
+    compute
+        From the input products and the study to the stage's product.
+    inputs
+        Products that it reads.
+    sections
+        Parts of the configuration that it reads, and no others: sections, or single keys such as
+        ``radar.frequency_count``.
+    by_channel
+        Whether each channel is computed from its own part of the inputs alone.
+    optional
+        Products that it reads if the study has them.
+    parallel
+        Whether it keeps more than one core busy.
+    """
+
+    compute: Callable[[Products, Study], xr.Dataset]
+    inputs: tuple[str, ...] = ()
+    sections: tuple[str, ...] = ()
+    by_channel: bool = False
+    optional: tuple[str, ...] = ()
+    parallel: bool = False
+
+    @property
+    def module(self) -> str:
+        """The module that declares it, whose code and imports its product depends on."""
+        return self.compute.__module__

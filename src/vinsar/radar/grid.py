@@ -1,0 +1,63 @@
+"""Grids on the ground: image and DEM, the keys that give them, and what is checked of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar.foundations.errors import Fault
+from vinsar.radar import geometry
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+
+KEYS = (
+    "imaging.x_min_m",
+    "imaging.x_max_m",
+    "imaging.y_min_m",
+    "imaging.y_max_m",
+    "imaging.grid_spacing_m",
+)
+"""Keys of the configuration that give the grid of image and DEM."""
+
+
+def image_axes(imaging: Any) -> tuple[Floats, Floats]:
+    """Return the axes x and y of image and DEM, m.
+
+    Parameters
+    ----------
+    imaging
+        Section ``imaging``.
+    """
+    return (
+        geometry.grid_axis(imaging.x_min_m, imaging.x_max_m, imaging.grid_spacing_m),
+        geometry.grid_axis(imaging.y_min_m, imaging.y_max_m, imaging.grid_spacing_m),
+    )
+
+
+def check_extent(section: str, part: Any) -> Iterator[Fault]:
+    """Check that a part of the ground ends beyond where it begins."""
+    for axis in "xy":
+        low, high = getattr(part, f"{axis}_min_m"), getattr(part, f"{axis}_max_m")
+        if low >= high:
+            yield Fault(f"{section}.{axis}_max_m", high, f"must exceed {axis}_min_m, {low}")
+
+
+def check_multiple(
+    key: str, value: float, low: float, high: float, spacing: float
+) -> Iterator[Fault]:
+    """Check that a spacing divides an extent, m."""
+    try:
+        geometry.grid_axis(low, high, spacing)
+    except ValueError:
+        count = max(1, round((high - low) / spacing))
+        yield Fault(
+            key,
+            value,
+            f"must divide the extent from {low:g} to {high:g} m; {(high - low) / count:.6g} would",
+        )

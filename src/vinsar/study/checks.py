@@ -1,0 +1,402 @@
+"""Checks across sections: the configuration held against radar physics, before anything runs.
+
+A rule is called with the sections that its parameters name and yields what is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar.foundations.errors import Fault
+from vinsar.radar import aperture, baseline, motion, trajectory, waveform
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from vinsar.evaluation.misregistration import Registration
+    from vinsar.processing.focusing import Imaging
+    from vinsar.processing.height import Height
+    from vinsar.processing.leakage import Suppression
+    from vinsar.radar.motion import Vehicle
+    from vinsar.radar.trajectory import Radar
+    from vinsar.simulation.echo import Echo
+    from vinsar.simulation.scene import Scene
+    from vinsar.study.options import Measurement, Outputs
+
+
+@dataclass(frozen=True)
+class _Derived:
+    """What the rules need of the radar; `foremost` is how far ahead of y = 0 an antenna stands."""
+
+    frequency: Any
+    wavelength: float
+    shortest_wavelength: float
+    range_cell: float
+    unambiguous_range: float
+    antennas: Any
+    apertures: Any
+    foremost: float
+
+    # A dozen rules ask, and the cases of a sweep have few radars between them.
+    @classmethod
+    @lru_cache(maxsize=32)
+    def of(cls, section: Radar) -> _Derived:
+        frequency = waveform.frequencies(
+            section.start_frequency_hz, section.stop_frequency_hz, section.frequency_count
+        )
+        antennas = trajectory.planned(section)
+        return cls(
+            frequency=frequency,
+            wavelength=waveform.wavelength(waveform.carrier(frequency)),
+            shortest_wavelength=waveform.wavelength(section.stop_frequency_hz),
+            range_cell=waveform.range_resolution(float(frequency[-1] - frequency[0])),
+            unambiguous_range=waveform.unambiguous_range(float(frequency[1] - frequency[0])),
+            antennas=antennas,
+            apertures=trajectory.apertures(antennas),
+            foremost=max(
+                0.0, *(antennas[name].values[..., 1].max() for name in ("transmitter", "receiver"))
+            ),
+        )
+
+    def reach(self, part: Scene | Imaging, behind_m: float = 0.0) -> tuple[float, float]:
+        """Return the nearest and the farthest slant range of a part of the ground, m."""
+        x, y = (
+            np.array([getattr(part, f"{axis}_{end}_m") for end in ("min", "max")]) for axis in "xy"
+        )
+        return trajectory.range_extent(self.antennas, x, y + np.array([0.0, behind_m]))
+
+
+def _ahead(radar: Radar, scene: Scene, imaging: Imaging) -> Iterator[Fault]:
+    # Half a wavelength would do for the mathematics; a facet does for the visibility.
+    foremost = _Derived.of(radar).foremost + scene.facet_size_m
+    for name, part in (("scene", scene), ("imaging", imaging)):
+        if part.y_min_m < foremost:
+            yield Fault(
+                f"{name}.y_min_m",
+                part.y_min_m,
+                f"must be {foremost:.3g} m or more: the antennas look ahead and stand at y = 0",
+            )
+
+
+def _object_heights(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    for number, part in enumerate(scene.objects):
+        for key in ("height_m", "depth_m"):
+            value = getattr(part, key, 0.0)
+            if value >= radar.rail_height_m:
+                yield Fault(
+                    f"scene.objects[{number}].{key}",
+                    value,
+                    f"must be below radar.rail_height_m, {radar.rail_height_m:g} m: what "
+                    "is as high hides all behind it",
+                )
+
+
+def _reference_in_image(height: Height, imaging: Imaging) -> Iterator[Fault]:
+    where = (
+        f"x {imaging.x_min_m:g} to {imaging.x_max_m:g} m, "
+        f"y {imaging.y_min_m:g} to {imaging.y_max_m:g} m"
+    )
+
+    def inside(x: float, y: float) -> bool:
+        return imaging.x_min_m <= x <= imaging.x_max_m and imaging.y_min_m <= y <= imaging.y_max_m
+
+    if height.reference == "level_ground":
+        for number, part in enumerate(height.level_ground):
+            corners = ((part.x_min_m, part.y_min_m), (part.x_max_m, part.y_max_m))
+            if not all(inside(*corner) for corner in corners):
+                yield Fault(
+                    f"height.level_ground[{number}]", corners, f"must lie in the image: {where}"
+                )
+    else:
+        for number, point in enumerate(height.control_points):
+            if not inside(point.x_m, point.y_m):
+                yield Fault(
+                    f"height.control_points[{number}]",
+                    (point.x_m, point.y_m),
+                    f"must lie in the image: {where}",
+                )
+
+
+def _measured_in_motion(measurement: Measurement, vehicle: Vehicle) -> Iterator[Fault]:
+    if measurement.file is not None and vehicle.forward_speed_m_per_s != 0:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            vehicle.forward_speed_m_per_s,
+            "must be 0 with measurement.file: its antenna positions have the motion in them",
+        )
+
+
+def _claims_judged(measurement: Measurement, outputs: Outputs) -> Iterator[Fault]:
+    if measurement.file is not None and outputs.claims:
+        yield Fault(
+            "outputs.claims", True, "must be false with measurement.file: no truth decides them"
+        )
+
+
+def _drives_short(
+    radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle
+) -> Iterator[Fault]:
+    speed, duration = vehicle.forward_speed_m_per_s, vehicle.scan_duration_s
+    foremost = _Derived.of(radar).foremost + scene.facet_size_m
+    room = min(scene.y_min_m, imaging.y_min_m) - foremost
+    if 0 < room < speed * duration / 2:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            f"must be at most {2 * room / duration:.3g} m/s, or vehicle.scan_duration_s at most "
+            f"{2 * room / speed:.3g} s: the vehicle drives {speed * duration / 2:.3g} m from the "
+            "middle of the scan to its end, into scene or image",
+        )
+
+
+def _unambiguous(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    behind = vehicle.forward_speed_m_per_s * vehicle.scan_duration_s / 2
+    for name, part in (("scene", scene), ("imaging", imaging)):
+        _, far = derived.reach(part, behind)
+        if far > derived.unambiguous_range:
+            count = int(np.ceil((radar.frequency_count - 1) * far / derived.unambiguous_range)) + 1
+            yield Fault(
+                f"{name}.y_max_m",
+                part.y_max_m,
+                f"its farthest slant range of {far:.2f} m must be within the unambiguous range, "
+                f"{derived.unambiguous_range:.2f} m; take radar.frequency_count {count} or more",
+            )
+
+
+def _facets_fine(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    half = _cell(radar, scene) / 2
+    if scene.facet_size_m > half:
+        yield Fault(
+            "scene.facet_size_m",
+            scene.facet_size_m,
+            f"must be at most half a resolution cell, {half:.4f} m",
+        )
+
+
+def _grid_fine(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
+    cell = _cell(radar, imaging)
+    if imaging.grid_spacing_m > cell:
+        yield Fault(
+            "imaging.grid_spacing_m",
+            imaging.grid_spacing_m,
+            f"must be at most the resolution, {cell:.4f} m",
+        )
+
+
+def _cell(radar_: Radar, part: Scene | Imaging) -> float:
+    """Return the finest resolution in a part of the ground, m."""
+    derived = _Derived.of(radar_)
+    x = np.clip(0.0, part.x_min_m, part.x_max_m)
+    cells = [
+        waveform.ground_resolution(derived.apertures[0], x, y, frequency=derived.frequency)
+        for y in (part.y_min_m, part.y_max_m)
+    ]  # fmt: skip
+    return float(np.min(cells))
+
+
+def _widest_spacing(radar: Radar, scene: Scene) -> float:
+    """Return the widest spacing of positions that images the scene's width without ambiguity, m."""
+    derived = _Derived.of(radar)
+    half = radar.aperture_length_m / 2
+    # Echoes from the sines s1 and s2 of the squint are told apart while the phase between
+    # neighbouring positions, 4 pi d (s1 - s2) / lambda, stays within a turn; where one end of the
+    # path stands still, half of it.
+    edge = np.array([scene.x_min_m - half, scene.x_max_m + half])
+    sine = edge / np.hypot(np.hypot(edge, scene.y_min_m), radar.rail_height_m)
+    moving_ends = 2 if radar.system == "rail" else 1
+    return derived.shortest_wavelength / (moving_ends * float(sine[1] - sine[0]))
+
+
+def _positions_dense(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    most = _widest_spacing(radar, scene)
+    if radar.system == "rail" and radar.position_spacing_m > most:
+        yield Fault(
+            "radar.position_spacing_m",
+            radar.position_spacing_m,
+            f"must be at most {most:.4f} m, or the scene's width is imaged ambiguously",
+        )
+
+
+def _driven_densely(radar: Radar, scene: Scene, vehicle: Vehicle) -> Iterator[Fault]:
+    speed = vehicle.forward_speed_m_per_s
+    if speed == 0:
+        return
+    moving = motion.advance(
+        trajectory.planned(radar), speed_m_per_s=speed, duration_s=vehicle.scan_duration_s
+    )
+    edges = (scene.x_min_m, 0.0, scene.x_max_m), (scene.y_min_m, scene.y_max_m)
+    points = np.stack([*np.meshgrid(*edges), np.zeros((2, 3))], axis=-1).reshape(-1, 3)
+    change = np.zeros(len(points))
+    for end in ("transmitter", "receiver"):
+        places = moving[end].values[0]
+        ray = points - places.mean(axis=0)
+        step = (places[-1] - places[0]) / (len(places) - 1)
+        change += ray @ step / np.linalg.norm(ray, axis=-1)
+    # Echoes are told apart while their phases' steps differ by less than a turn.
+    if np.ptp(change) > _Derived.of(radar).shortest_wavelength:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            f"the vehicle drives {step[1]:.3g} m from one antenna position to the next, and the "
+            "scene is imaged ambiguously; take a shorter vehicle.scan_duration_s or "
+            "radar.position_spacing_m",
+        )
+
+
+def _gate_before_image(radar: Radar, suppression: Suppression, imaging: Imaging) -> Iterator[Fault]:
+    if suppression.method not in ("gate", "both"):
+        return
+    derived = _Derived.of(radar)
+    near, far = derived.reach(imaging)
+    # Ranges repeat: the gate lies beyond the image as well.
+    most = min(near / 2, derived.unambiguous_range - far)
+    if suppression.gate_range_m > most:
+        yield Fault(
+            "suppression.gate_range_m",
+            suppression.gate_range_m,
+            f"must be at most {most:.2f} m: half the slant range of the image's near edge, and "
+            "what the unambiguous range leaves beyond its far edge",
+        )
+
+
+def _targets_imaged(radar: Radar, registration: Registration) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    heights = np.array([registration.height_min_m, registration.height_max_m])
+    for name, target in (("near", registration.near), ("far", registration.far)):
+        images = [
+            aperture.image_position(part, target.x_m, target.y_m, heights)
+            for part in derived.apertures
+        ]
+        if target.y_m <= derived.foremost or np.isnan(images).any():
+            yield Fault(
+                f"registration.{name}.y_m",
+                target.y_m,
+                "must be farther ahead: a target of these heights has no image on the ground",
+            )
+
+
+def _claims_of_a_rail(radar: Radar, outputs: Outputs) -> Iterator[Fault]:
+    if outputs.claims and radar.system != "rail":
+        yield Fault("outputs.claims", True, "must be false: the paper's claims are those of a rail")
+
+
+def _baseline_short(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    x = float(np.clip(0.0, scene.x_min_m, scene.x_max_m))
+    seen = replace(baseline.view(radar, scene), x_m=x, y_m=scene.y_min_m)
+    limit, across = seen.critical_baseline / 4, float(seen.across(radar.baseline_m))
+    if across > limit:
+        yield Fault(
+            "radar.baseline_m",
+            radar.baseline_m,
+            f"its part across the line of sight, {across:.3f} m, exceeds a quarter of "
+            f"the critical baseline, {limit:.3f} m, at the scene's near edge: coherence "
+            "will suffer",
+        )
+
+
+def _elements_dense(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    most = _widest_spacing(radar, scene)
+    if radar.system != "rail" and radar.position_spacing_m > most:
+        yield Fault(
+            "radar.position_spacing_m",
+            radar.position_spacing_m,
+            f"is wider than {most:.4f} m: grating lobes of the array fold the scene's edges over "
+            "each other",
+        )
+
+
+def _sides_apart(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) -> Iterator[Fault]:
+    # The corner that the axis meets first as it turns.
+    most = min(
+        part.y_min_m / part.x_max_m if part.x_max_m > 0 else np.inf for part in (scene, imaging)
+    )
+    speed = vehicle.forward_speed_m_per_s
+    lower = trajectory.apertures(
+        motion.advance(
+            trajectory.planned(radar), speed_m_per_s=speed, duration_s=vehicle.scan_duration_s
+        )
+    )[0]
+    # A transmitter that stands on the vehicle halves the way along x, and not that ahead.
+    along, ahead, _ = lower.transmitter_travel + lower.receiver_travel
+    if ahead > most * along:
+        limit = speed * most * along / ahead
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            "turns the aperture until its axis meets the scene, and ground on one side of the axis "
+            f"is imaged upon that on the other; this scan keeps them apart up to {limit:.3g} m/s",
+        )
+
+
+def _facets_coarse(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    if scene.facet_size_m < derived.wavelength:
+        yield Fault(
+            "scene.facet_size_m",
+            scene.facet_size_m,
+            f"is below the wavelength, {derived.wavelength:.4f} m: many facets for little",
+        )
+
+
+def _coupling_in_gate(echo: Echo, suppression: Suppression) -> Iterator[Fault]:
+    gated = suppression.method in ("gate", "both")
+    if (
+        echo.coupling_db is not None
+        and gated
+        and echo.coupling_path_m > 2 * suppression.gate_range_m
+    ):
+        yield Fault(
+            "suppression.gate_range_m",
+            suppression.gate_range_m,
+            f"the coupling comes from beyond it, {echo.coupling_path_m / 2:g} m, and stays",
+        )
+
+
+def _image_in_scene(scene: Scene, imaging: Imaging) -> Iterator[Fault]:
+    outside = (
+        imaging.x_min_m < scene.x_min_m
+        or imaging.x_max_m > scene.x_max_m
+        or imaging.y_min_m < scene.y_min_m
+        or imaging.y_max_m > scene.y_max_m
+    )
+    if outside:
+        yield Fault(
+            "imaging", None, "the image reaches beyond the scene: nothing scatters there but noise"
+        )
+
+
+CHECKS = (
+    # Antennas in the scene would only confuse the others.
+    (_ahead,),
+    (
+        _reference_in_image,
+        _object_heights,
+        _measured_in_motion,
+        _claims_judged,
+        _drives_short,
+        _unambiguous,
+        _facets_fine,
+        _grid_fine,
+        _positions_dense,
+        _driven_densely,
+        _gate_before_image,
+        _targets_imaged,
+        _claims_of_a_rail,
+    ),
+)
+"""In groups: what a group finds wrong is kept from the next."""
+
+ADVICE = (
+    _baseline_short,
+    _elements_dense,
+    _facets_coarse,
+    _coupling_in_gate,
+    _image_in_scene,
+    _sides_apart,
+)
+"""What is allowed but unwise."""
