@@ -147,8 +147,8 @@ from pathlib import Path
 import yaml
 import vinsar.figures
 assert "matplotlib" not in sys.modules, "importing the figures is not light"
-from vinsar.study import config
-study = config.Study.model_validate(yaml.safe_load(Path(sys.argv[1]).read_text(encoding="utf-8")))
+from vinsar.study.composition import StudyModel
+study = StudyModel.model_validate(yaml.safe_load(Path(sys.argv[1]).read_text(encoding="utf-8")))
 paths = [Path(sys.argv[2]) / f"fig1.{suffix}" for suffix in ("pdf", "svg", "png")]
 figure = vinsar.figures.FIGURES["fig1"].draw({}, study)
 vinsar.figures.save(figure, paths, png_dpi=100)
