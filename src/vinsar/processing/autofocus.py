@@ -1,0 +1,614 @@
+"""Antenna positions from the echoes themselves: corrections of navigated positions.
+
+Two facts carry it. Antennas closer together than the scene's speckle is wide see nearly the same
+speckle, so the phase between their echoes is the difference of their range errors; and both
+antennas of an interferometer see the same scene from the *same* position, so that the difference
+between the channels, which heights need, is measured position by position and does not drift.
+
+1. `_coarse` takes each position's echo along the middle line of the scene, in sub-bands. The
+   phases between neighbours, and their slopes over the sub-bands, are joined to one range error a
+   position by angular synchronisation.
+2. `_Image.step` holds what each position adds to the image against what all others make of it, in
+   sectors of angle and range. The phases over the sectors give three components of displacement:
+   along x they are antisymmetric across the scene, along z they change with range. A normal prior,
+   whose variances are found from the echoes (by axis, common to the antennas and between them),
+   keeps components that nothing speaks for at zero.
+
+The second step starts from the navigated positions and from the first step's, and the better focus
+decides.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.processing import focusing
+from vinsar.radar import trajectory, waveform
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.floating]
+    Complexes = NDArray[np.complexfloating]
+
+logger = logging.getLogger(__name__)
+
+Extent = tuple[float, float, float, float]
+
+_SUB_BANDS = 4
+_OVERSAMPLING = 8
+_LEAST_POSITIONS = 16
+
+# Positions apart: phases of the carrier, and their slope over the sub-bands.
+_PHASE_LAG, _SLOPE_LAG = 8, 3
+_COARSE_ROUNDS, _SLIP_ROUNDS = 3, 6
+
+# Whole cycles that a position may be off, and from one position to the next.
+_MOST_SLIPS, _MOST_JUMP = 8, 2
+
+# Coherence that neighbours need by their distance alone, and the focus that a result needs.
+_LEAST_COHERENCE, _LEAST_FOCUS = 0.3, 0.6
+
+# Range margin of the profiles, m: the largest errors of position.
+_MARGIN_M = 0.5
+
+# Sectors across the scene and along range; window, in cells, that smooths the topographic phase.
+_ACROSS, _ALONG = 6, 4
+_WINDOW = (9, 3)
+
+# Steps from each start before the better one goes on, and at most; relative gain that ends them.
+_TRIAL_STEPS, _MOST_STEPS, _LEAST_GAIN = 3, 16, 1e-3
+
+# What the start from range errors must gain in focus over the navigated positions.
+_PREFERENCE = 1.015
+
+# Gain in focus below which the navigated positions stay: errors that small harm no image.
+_WORTH = 1.03
+
+# Bounds of the prior's standard deviation in wavelengths, and where it begins.
+_LEAST_STD, _FIRST_STD, _MOST_STD = 0.005, 1.0, 4.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where the antennas were, relative to where they are recorded to have been.
+
+    Attributes
+    ----------
+    displacement
+        To add to the recorded positions (channel, position, axis), m; 0 if nothing is applied.
+    displacement_std
+        Its standard deviation (channel, position, axis), m: where nothing is applied, that of the
+        errors which the echoes leave possible, NaN if they say nothing.
+    range_correction, range_std
+        The same along the line of sight to the middle of the scene (channel, position), m.
+    focus
+        Share of the full coherence among the positions before and after, 0 to 1.
+    reason
+        Why nothing is applied; empty if something is.
+    """
+
+    displacement: Floats
+    displacement_std: Floats
+    range_correction: Floats
+    range_std: Floats
+    focus: tuple[float, float]
+    reason: str = ""
+
+
+def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motion:
+    """Estimate the errors of the recorded positions from the echoes.
+
+    Parameters
+    ----------
+    echo
+        Product ``received`` of two channels, without leakage.
+    recorded
+        Product ``trajectory``: the navigated positions.
+    extent
+        Ground that echoes come from (x_min, x_max, y_min, y_max), m, which must lie ahead.
+
+    Returns
+    -------
+    Motion
+        The displacements. Where the echoes cannot tell them they are 0, the reason is given, and
+        a warning is logged.
+    """
+    channels, positions = recorded.sizes["channel"], recorded.sizes["position"]
+    if positions < _LEAST_POSITIONS:
+        return _nothing(
+            channels, positions, f"{positions} positions are too few; take {_LEAST_POSITIONS}"
+        )
+    samples = _Samples(echo, recorded, extent)
+    error, coherence = _coarse(samples)
+    gap = _gap(samples, coherence)
+    if gap is not None:
+        return _nothing(channels, positions, gap)
+    image = _Image(samples)
+    starts = [np.zeros((channels, positions, 3)), samples.along_sight(error)]
+    trials = [image.refine(start, _TRIAL_STEPS) for start in starts]
+    before = image.energy_of(starts[0])
+    chosen = trials[int(trials[1].energy > _PREFERENCE * trials[0].energy)]
+    result = image.refine(chosen.displacement, _MOST_STEPS - _TRIAL_STEPS, chosen.prior)
+    focus = samples.focus(before, result), samples.focus(result.energy, result)
+    std = np.sqrt(np.einsum("clii->cli", result.covariance))
+    sight = samples.sight()
+    range_std = np.sqrt(np.einsum("cli,clij,clj->cl", sight, result.covariance, sight))
+    if focus[1] < _LEAST_FOCUS:
+        reason = f"the echoes of all positions agree to {focus[1]:.0%} only"
+        return _nothing(channels, positions, reason, focus)
+    if result.energy < _WORTH * before:
+        reason = f"the navigated positions focus to {focus[0]:.0%} already"
+        logger.info("autofocus: no correction, because %s", reason)
+        nothing = np.zeros((channels, positions, 3))
+        return Motion(nothing, std, nothing[..., 0].copy(), range_std, focus, reason)
+    logger.info("autofocus: focus from %.0f to %.0f %%", *(100 * share for share in focus))
+    return Motion(
+        displacement=result.displacement,
+        displacement_std=std,
+        range_correction=np.einsum("cli,cli->cl", sight, result.displacement),
+        range_std=range_std,
+        focus=focus,
+    )
+
+
+def apply(recorded: xr.Dataset, displacement: Floats) -> xr.Dataset:
+    """Return the recorded positions with the displacement added.
+
+    Parameters
+    ----------
+    recorded
+        Product ``trajectory``.
+    displacement
+        Displacement (channel, position, axis), m, of transmitter and receiver alike.
+    """
+    return recorded.assign(
+        {name: recorded[name] + displacement for name in ("transmitter", "receiver")}
+    )
+
+
+def _nothing(
+    channels: int, positions: int, reason: str, focus: tuple[float, float] = (np.nan, np.nan)
+) -> Motion:
+    logger.warning("autofocus: no correction, because %s", reason)
+    shape = channels, positions
+    return Motion(
+        displacement=np.zeros((*shape, 3)),
+        displacement_std=np.full((*shape, 3), np.nan),
+        range_correction=np.zeros(shape),
+        range_std=np.full(shape, np.nan),
+        focus=focus,
+        reason=reason,
+    )
+
+
+class _Samples:
+    """The echoes as profiles, and the ground that they come from in polar coordinates."""
+
+    def __init__(self, echo: xr.Dataset, recorded: xr.Dataset, extent: Extent) -> None:
+        self.transmitter = recorded["transmitter"].values
+        self.receiver = recorded["receiver"].values
+        self.channels, self.positions, _ = self.transmitter.shape
+        self.extent = extent
+        self.frequency = echo["frequency"].values
+        self.wavelength = waveform.wavelength(waveform.carrier(self.frequency))
+        x, y = np.array(extent[:2]), np.array(extent[2:])
+        near, far = trajectory.range_extent(recorded, x, y)
+        each = self.frequency.size // _SUB_BANDS
+        bands = [slice(None), *(slice(k * each, (k + 1) * each) for k in range(_SUB_BANDS))]
+        self.profiles = []
+        for band in bands:
+            profiles = focusing.compress(
+                echo.isel(frequency=band),
+                near_range_m=max(near - _MARGIN_M, 0.0),
+                far_range_m=far + _MARGIN_M,
+                oversampling=_OVERSAMPLING,
+            )
+            slant = profiles["slant_range"].values
+            self.profiles.append(
+                (
+                    profiles["profile"].values.reshape(-1, slant.size),
+                    float(slant[0]),
+                    float(slant[-1] - slant[0]) / (slant.size - 1),
+                    2 * float(profiles["carrier_frequency"]) / SPEED_OF_LIGHT,
+                )
+            )
+        self.step_hz = float(self.frequency[each] - self.frequency[0])
+        self.cell = waveform.range_resolution(float(self.frequency[-1] - self.frequency[0]))
+        self.center = (self.transmitter + self.receiver).mean(axis=(0, 1)) / 2
+        self.middle = (extent[0] + extent[1]) / 2
+        coarse = self.ranges(self.cell * self.frequency.size / each)
+        self.line = self.on_ground(coarse, np.zeros(1))[:, 0]
+        self.count = len(coarse) * _SUB_BANDS
+
+    def ranges(self, spacing: float) -> Floats:
+        """Return cells of slant range from the centre along the middle line, m."""
+        offset = self.middle - self.center[0], self.center[2]
+        low, high = (
+            np.sqrt((y - self.center[1]) ** 2 + offset[0] ** 2 + offset[1] ** 2)
+            for y in self.extent[2:]
+        )
+        count = max(1, int((high - low) / spacing))
+        return np.asarray((low + high) / 2 + spacing * (np.arange(count) - (count - 1) / 2))
+
+    def on_ground(self, ranges: Floats, across: Floats) -> Floats:
+        """Return points (range, angle, 3) on the ground at sines of angle from the middle line."""
+        ground = np.sqrt(ranges**2 - self.center[2] ** 2)[:, None]
+        sine = (self.middle - self.center[0]) / ground + across
+        x = self.center[0] + ground * sine
+        y = self.center[1] + ground * np.sqrt(np.maximum(1 - sine**2, 0))
+        return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+    def width(self, range_m: float) -> float:
+        """Return the sine of the angle that the scene spans at a slant range."""
+        ground = np.sqrt(range_m**2 - self.center[2] ** 2)
+        return float((self.extent[1] - self.extent[0]) / ground)
+
+    def take(self, band: int, displacement: Floats, points: Floats) -> Complexes:
+        """Return what positions contribute to points (channel * position, point)."""
+        from vinsar.kernels import contributions
+
+        out = np.empty((self.channels * self.positions, len(points)), np.complex64)
+        contributions.fill(
+            *self.profiles[band],
+            (self.transmitter + displacement).reshape(-1, 3),
+            (self.receiver + displacement).reshape(-1, 3),
+            points,
+            out,
+        )
+        return out
+
+    def gradient(self, displacement: Floats, points: Floats) -> Floats:
+        """Return how the half path to points grows with a displacement (..., point, 3)."""
+        total = np.zeros((*self.transmitter.shape[:2], len(points), 3))
+        for end in (self.transmitter, self.receiver):
+            ray = points - (end + displacement)[..., None, :]
+            total -= ray / np.linalg.norm(ray, axis=-1, keepdims=True) / 2
+        return total
+
+    def sight(self) -> Floats:
+        """Return the gradient (channel, position, 3) at the middle of the scene."""
+        point = self.line[len(self.line) // 2]
+        return self.gradient(np.zeros_like(self.transmitter), point[None])[:, :, 0]
+
+    def along_sight(self, range_error: Floats) -> Floats:
+        """Return the displacement along the line of sight that makes range errors."""
+        sight = self.sight()
+        size = (sight**2).sum(axis=-1, keepdims=True)
+        return np.asarray(sight / size * range_error.reshape(*sight.shape[:2], 1))
+
+    def level_covariance(self, displacement: Floats) -> Complexes:
+        """Return the covariance (antenna, antenna) by a level scene, of unit power."""
+        middle = self.line[len(self.line) // 2]
+        slant = float(np.linalg.norm(middle - self.center))
+        width = self.width(slant)
+        cells = max(2, int(np.ceil(2 * width / self.angle_cell())))
+        sines = width * ((np.arange(cells) + 0.5) / cells - 0.5)
+        arc = self.on_ground(np.array([slant]), sines)[0]
+        paths = []
+        for points in (arc, middle[None]):
+            legs = [
+                np.linalg.norm(points - (end + displacement)[..., None, :], axis=-1)
+                for end in (self.transmitter, self.receiver)
+            ]
+            paths.append((legs[0] + legs[1]) / 2)
+        phase = -4 * np.pi / self.wavelength * (paths[0] - paths[1]).reshape(-1, cells)
+        steering = np.exp(1j * phase)
+        return np.asarray(steering @ steering.conj().T / cells)
+
+    def angle_cell(self) -> float:
+        """Return the aperture's resolution in the sine of angle."""
+        ends = self.transmitter[..., 0] + self.receiver[..., 0]
+        return float(self.wavelength / np.ptp(ends))
+
+    def focus(self, energy: float, state: _State) -> float:
+        """Return the share of the full coherence that an image energy tells."""
+        size = np.abs(self.level_covariance(state.displacement)) ** 2
+        size = size.reshape(self.channels, self.positions, self.channels, self.positions)
+        own = np.mean([size[c, :, c].sum() for c in range(self.channels)]) / self.positions
+        return float(np.clip((energy - 1) / (own - 1), 0, 1))
+
+
+def _gap(samples: _Samples, measured: Floats) -> str | None:
+    """Return what keeps neighbouring positions from seeing the same speckle, if anything.
+
+    Navigated positions with errors seem farther apart than they are, and echoes may be weak: both
+    must tell of the gap.
+    """
+    nearest = np.zeros((2, samples.positions - 1))
+    level = np.abs(samples.level_covariance(np.zeros_like(samples.transmitter)))
+    for row, size in zip(nearest, (level, measured), strict=True):
+        pairs = size.reshape(samples.channels, samples.positions, samples.channels, -1)
+        for channel in range(samples.channels):
+            for lag in range(1, _SLOPE_LAG + 1):
+                values = np.diagonal(pairs[channel, :, channel], lag)
+                for shift in range(lag):
+                    reached = row[shift : shift + values.size]
+                    np.maximum(reached, values, out=reached)
+    most = nearest.max(axis=0)
+    weakest = int(most.argmin())
+    if most[weakest] >= _LEAST_COHERENCE:
+        return None
+    ends = (samples.transmitter + samples.receiver)[0, weakest : weakest + 2] / 2
+    return (
+        f"positions {weakest} and {weakest + 1}, {np.linalg.norm(ends[1] - ends[0]):.3f} m apart, "
+        f"share a coherence of {most[weakest]:.2f} at most: they see other speckle"
+    )
+
+
+def _coarse(samples: _Samples) -> tuple[Floats, Floats]:
+    """Return range errors (channel, position), m, true less navigated, but for a constant.
+
+    With them, the coherence (antenna, antenna) of the positions that they leave.
+    """
+    shape = samples.channels, samples.positions
+    place = np.tile(np.arange(samples.positions), samples.channels)
+    lag = np.abs(place[:, None] - place)
+    size = place.size
+    carrier = np.array([2 * np.pi * band[3] for band in samples.profiles[1:]])
+    period = SPEED_OF_LIGHT / (2 * samples.step_hz)
+    cells = samples.count // _SUB_BANDS
+    error = np.zeros(size)
+    covariance: Complexes = np.empty(0, complex)
+
+    def shift(by: Floats) -> None:
+        nonlocal error, covariance
+        turn = np.exp(1j * carrier[:, None] * by)
+        covariance = covariance * (turn[:, :, None] * turn[:, None, :].conj())
+        error = error + by
+
+    for _ in range(_COARSE_ROUNDS):
+        displacement = samples.along_sight(error)
+        level = samples.level_covariance(displacement)
+        covariance = _covariance(samples, displacement) * np.exp(-1j * np.angle(level))
+        slope = (covariance[1:] * covariance[:-1].conj()).mean(axis=0)
+        weight = np.where(lag <= _SLOPE_LAG, _weight(np.sqrt(np.abs(slope)), cells), 0)
+        delay = -np.angle(_synchronise(slope, weight)) * period / (2 * np.pi)
+        total = error + delay
+        shift(delay - period * np.round(total / period))
+        whole = covariance.mean(axis=0)
+        weight = np.where(lag <= _PHASE_LAG, _weight(np.abs(whole), samples.count), 0)
+        phase = np.angle(_synchronise(whole, weight)).reshape(shape)
+        phase = np.unwrap(phase, axis=1)
+        turns = np.round(np.median(phase - phase[0], axis=1) / (2 * np.pi))
+        phase -= 2 * np.pi * turns[:, None]
+        shift(-(phase - np.median(phase)).ravel() * samples.wavelength / (4 * np.pi))
+        error = error - error.mean()
+    for _ in range(_SLIP_ROUNDS):
+        cycles = _slips(samples, covariance, error)
+        if not cycles.any():
+            break
+        shift(cycles * samples.wavelength / 2)
+    return error.reshape(shape), np.abs(covariance.mean(axis=0))
+
+
+def _covariance(samples: _Samples, displacement: Floats) -> Complexes:
+    """Return the sample covariance (sub-band, antenna, antenna) along the middle line."""
+    result = []
+    for band in range(1, _SUB_BANDS + 1):
+        values = samples.take(band, displacement, samples.line)
+        values = values / np.sqrt((np.abs(values) ** 2).mean(axis=0))
+        values = values / np.sqrt((np.abs(values) ** 2).mean(axis=1, keepdims=True))
+        result.append(values @ values.conj().T / values.shape[1])
+    return np.array(result)
+
+
+def _weight(coherence: Floats, looks: int) -> Floats:
+    """Return the weight of a phase, the inverse of its variance but for a factor."""
+    square = np.clip((coherence**2 - 1 / looks) / (1 - 1 / looks), 0, 0.98)
+    return np.asarray(square / (1 - square))
+
+
+def _synchronise(products: Complexes, weight: Floats, steps: int = 20) -> Complexes:
+    """Return the unit phasors whose products fit best: the leading eigenvector, then by turns."""
+    from scipy.linalg import eigh
+
+    matrix = weight * products / np.maximum(np.abs(products), np.finfo(np.float32).tiny)
+    np.fill_diagonal(matrix, 0)
+    last = len(matrix) - 1
+    vector = eigh(matrix, subset_by_index=(last, last))[1][:, 0]
+    for _ in range(steps):
+        vector = vector / np.maximum(np.abs(vector), np.finfo(float).tiny)
+        vector = matrix @ vector
+    vector = vector / np.maximum(np.abs(vector), np.finfo(float).tiny)
+    mean = vector.mean()
+    return np.asarray(vector * np.exp(-1j * np.angle(mean)))
+
+
+def _slips(samples: _Samples, covariance: Complexes, error: Floats) -> NDArray[np.integer]:
+    """Return whole cycles, common to the channels, by which range errors are more likely.
+
+    The carrier's phase leaves half a wavelength open from one position to the next, and the slope
+    over the sub-bands tells it only to a few millimetres. Dynamic programming over the cycles of
+    each position weighs the phases of neighbours in the sub-bands against errors larger than the
+    others are.
+    """
+    channels, positions = samples.channels, samples.positions
+    carrier = np.array([band[3] for band in samples.profiles[1:]])
+    turn = 2 * np.pi * carrier * samples.wavelength / 2
+    jumps = np.arange(-_MOST_JUMP, _MOST_JUMP + 1)
+    cycles = np.arange(-_MOST_SLIPS, _MOST_SLIPS + 1)
+    whole = covariance.mean(axis=0)
+    gain = np.zeros((positions - 1, jumps.size))
+    before = np.arange(positions - 1)
+    for first in range(channels):
+        for second in range(channels):
+            i, j = first * positions + before + 1, second * positions + before
+            square = np.clip(np.abs(whole[i, j]) ** 2 - 1 / samples.count, 0, 0.98)
+            fit = np.einsum("kp,km->pm", covariance[:, i, j], np.exp(1j * turn[:, None] * jumps))
+            gain += (np.sqrt(square) / (1 - square))[:, None] * fit.real
+    # Neighbouring pairs see the same speckle: the pairs of all channels count as half of them.
+    gain *= samples.count / _SUB_BANDS / channels
+    common = error.reshape(channels, positions).mean(axis=0)
+    variance = (common**2).mean() + np.finfo(float).tiny
+    cost = (common[:, None] + samples.wavelength / 2 * cycles) ** 2 / (2 * variance)
+    best = -cost[0]
+    chosen = []
+    for position in range(positions - 1):
+        candidates = np.full((jumps.size, cycles.size), -np.inf)
+        for row, jump in enumerate(jumps.tolist()):
+            to = slice(max(jump, 0), cycles.size + min(jump, 0))
+            come = slice(max(-jump, 0), cycles.size + min(-jump, 0))
+            candidates[row, to] = best[come] + gain[position, row]
+        chosen.append(candidates.argmax(axis=0))
+        best = candidates.max(axis=0) - cost[position + 1]
+    state = int(best.argmax())
+    path = np.empty(positions, int)
+    for position in range(positions - 1, -1, -1):
+        path[position] = cycles[state]
+        if position:
+            state -= jumps[chosen[position - 1][state]]
+    return np.tile(path, channels)
+
+
+@dataclass(frozen=True)
+class _State:
+    """What the image's steps have come to."""
+
+    displacement: Floats
+    covariance: Floats
+    prior: Floats
+    energy: float
+
+
+class _Image:
+    """The image in polar coordinates, and what each position adds to it."""
+
+    def __init__(self, samples: _Samples) -> None:
+        self.samples = samples
+        ranges = samples.ranges(samples.cell)
+        width = samples.width(float(ranges.mean()))
+        angles = _ACROSS * max(1, int(np.ceil(width / samples.angle_cell() / _ACROSS)))
+        sine = width * ((np.arange(angles) + 0.5) / angles - 0.5)
+        points = samples.on_ground(ranges, sine)
+        self.shape = points.shape[:2]
+        blocks = [
+            block
+            for rows in np.array_split(np.arange(ranges.size), min(_ALONG, ranges.size))
+            for block in (
+                (rows[:, None] * angles + columns).ravel()
+                for columns in np.array_split(np.arange(angles), _ACROSS)
+            )
+        ]
+        self.order = np.concatenate(blocks)
+        self.begins = np.cumsum([0, *(block.size for block in blocks[:-1])])
+        flat = points.reshape(-1, 3)
+        self.points = np.ascontiguousarray(flat[self.order])
+        self.middles = np.array([flat[block].mean(axis=0) for block in blocks])
+        along = np.linspace(-1, 1, samples.positions)
+        self.trend = np.linalg.qr(np.stack([np.ones_like(along), along], axis=1))[0]
+
+    def correlate(self, displacement: Floats) -> tuple[Complexes, float]:
+        """Return each position's part of the image against the others' (channel, position, sector).
+
+        The energy of the image goes with it, relative to that of incoherent positions.
+        """
+        samples = self.samples
+        shape = samples.channels, samples.positions, -1
+        parts = samples.take(0, displacement, self.points).reshape(shape)
+        image = parts.sum(axis=1)
+        power = (parts.real**2 + parts.imag**2).sum(axis=(0, 1))
+        energy = float((np.abs(image) ** 2).sum() / power.sum())
+        parts *= 1 / np.sqrt(power.mean())
+        image *= 1 / np.sqrt(power.mean())
+        reference = image + self.other_channel(image)
+        products = parts * reference.conj()[:, None]
+        products -= parts.real**2 + parts.imag**2
+        return np.add.reduceat(products, self.begins, axis=2).astype(complex), energy
+
+    def other_channel(self, image: Complexes) -> Complexes:
+        """Return the other channel's image, turned by the phase of the topography between them."""
+        from scipy.ndimage import uniform_filter
+
+        grid = np.empty_like(image)
+        grid[:, self.order] = image
+        grid = grid.reshape(2, *self.shape)
+
+        def smooth(values: Floats) -> Floats:
+            return np.asarray(uniform_filter(values, _WINDOW, mode="nearest"))
+
+        product = grid[0] * grid[1].conj()
+        power = [smooth(np.abs(part) ** 2) for part in grid]
+        cross = smooth(product.real) + 1j * smooth(product.imag)
+        cross /= np.sqrt(power[0] * power[1]) + np.finfo(np.float32).tiny
+        turned = cross.ravel()[self.order]
+        return np.stack([turned * image[1], turned.conj() * image[0]])
+
+    def energy_of(self, displacement: Floats) -> float:
+        """Return the energy of the image relative to that of incoherent positions."""
+        return self.correlate(displacement)[1]
+
+    def step(self, displacement: Floats, prior: Floats) -> _State:
+        """Take one step of Gauss and Newton; the energy is that of the image before it."""
+        samples = self.samples
+        channels, positions = samples.channels, samples.positions
+        found, energy = self.correlate(displacement)
+        gradient = samples.gradient(displacement, self.middles)
+        wave = 4 * np.pi / samples.wavelength
+        # Amplitude and noise by sector: what is not in focus has little of the first.
+        amplitude = np.maximum(found.real.mean(axis=1), 0)
+        weight = amplitude / (found.imag**2).mean(axis=1)
+        slope = -wave * np.einsum("cs,clsi,cls->lci", weight, gradient, found.imag)
+        curvature = wave**2 * np.einsum(
+            "cs,clsi,clsj->clij", weight * amplitude, gradient, gradient
+        )
+        system = np.zeros((positions, channels, 3, channels, 3))
+        for channel in range(channels):
+            system[:, channel, :, channel] = curvature[channel]
+        keep = _precision(prior)
+        slope -= np.einsum("cidj,dlj->lci", keep, displacement)
+        size = 3 * channels
+        inverse = np.linalg.inv((system + keep).reshape(positions, size, size))
+        move = np.einsum("lij,lj->li", inverse, slope.reshape(positions, size))
+        moved = displacement + move.reshape(positions, channels, 3).transpose(1, 0, 2)
+        # Along x a constant and a stretch turn and scale the image, which no echo contradicts.
+        common = moved[..., 0].mean(axis=0)
+        moved[..., 0] -= self.trend @ (self.trend.T @ common)
+        inverse = inverse.reshape(positions, channels, 3, channels, 3)
+        own = np.stack([inverse[:, channel, :, channel] for channel in range(channels)])
+        return _State(moved, own, self.variances(moved, inverse, prior), energy)
+
+    def variances(self, moved: Floats, inverse: Floats, prior: Floats) -> Floats:
+        """Return the prior's standard deviations (mode, axis) that make the estimate likeliest."""
+        positions = self.samples.positions
+        wavelength = self.samples.wavelength
+        result = np.empty_like(prior)
+        for mode, signs in enumerate(_MODES):
+            value = np.einsum("c,cli->li", signs, moved)
+            spread = np.einsum("c,lcidi,d->li", signs, inverse, signs)
+            known = positions - spread.sum(axis=0) / prior[mode] ** 2
+            result[mode] = np.sqrt((value**2).sum(axis=0) / np.maximum(known, 1e-3))
+        return np.clip(result, _LEAST_STD * wavelength, _MOST_STD * wavelength)
+
+    def refine(self, displacement: Floats, steps: int, prior: Floats | None = None) -> _State:
+        """Take steps until the energy gains no more; the energy is that of the result."""
+        if prior is None:
+            prior = np.full((2, 3), _FIRST_STD * self.samples.wavelength)
+        state = _State(displacement, np.empty(0), prior, 0.0)
+        best = 0.0
+        for _ in range(steps):
+            state = self.step(state.displacement, state.prior)
+            if state.energy < best * (1 + _LEAST_GAIN):
+                break
+            best = state.energy
+        return _State(
+            state.displacement, state.covariance, state.prior, self.energy_of(state.displacement)
+        )
+
+
+# What is common to the channels, and their difference.
+_MODES = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
+
+
+def _precision(prior: Floats) -> Floats:
+    """Return the inverse covariance (channel, axis, channel, axis) of the prior (mode, axis)."""
+    result = np.zeros((2, 3, 2, 3))
+    for axis in range(3):
+        result[:, axis, :, axis] = (_MODES.T / prior[:, axis] ** 2) @ _MODES
+    return result
