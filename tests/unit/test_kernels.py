@@ -12,6 +12,7 @@ import dask
 import numba
 import numpy as np
 import pytest
+from llvmlite import binding
 
 from vinsar.foundations import variables
 from vinsar.kernels import backprojection, columns, functions, lookup, multilook, patches, splat
@@ -36,13 +37,18 @@ def call_phasor(turn, cosine, sine):
 
 
 @kernel
-def call_copy(pairs, index, base, table, out0, out1, out2, out3):
-    lookup.copy(pairs, index, base, table, (out0, out1, out2, out3))
+def call_copy(windows, index, base, table, out0, out1, out2, out3):
+    lookup.copy(windows, index, base, table, (out0, out1, out2, out3))
 
 
 @kernel
-def call_pairs(reach):
-    return lookup.pairs_for(reach)
+def call_windows(reach, taps):
+    return lookup.windows_for(reach, taps)
+
+
+@kernel
+def call_lanes():
+    return lookup.lanes()
 
 
 def test_the_phasor_errs_below_minus_105_db():
@@ -53,30 +59,38 @@ def test_the_phasor_errs_below_minus_105_db():
     assert 20 * np.log10(np.abs(cosine + 1j * sine - exact).max()) < -105
 
 
-@pytest.mark.parametrize(("pairs", "reach"), [(1, 13), (2, 29)])
+@pytest.mark.parametrize(("windows", "reach"), [(1, 2), (1, 14), (2, 30)])
 @pytest.mark.parametrize("base", [40, -3, 980])
-def test_registers_give_the_samples_that_single_copies_give(pairs, reach, base):
-    if call_pairs(reach) != pairs:
-        pytest.skip("this machine has no AVX-512")
-    rng = np.random.default_rng(pairs)
+def test_registers_give_the_samples_that_single_copies_give(windows, reach, base):
+    if call_windows(reach, 4) != windows:
+        pytest.skip("this machine has other vector registers")
+    rng = np.random.default_rng(windows)
     table = rng.random(1000 + lookup.PADDING).astype(np.float32)
-    middle = np.repeat(rng.integers(30, 60, 8), lookup.LANES)
+    lanes = call_lanes()
+    middle = np.repeat(rng.integers(30, 60, 8 * lookup.LANES // lanes), lanes)
     index = (middle + rng.integers(-reach, reach + 1, middle.size)).astype(np.int32)
-    index[lookup.LANES // 2 :: lookup.LANES] = middle[:: lookup.LANES]
+    index[lanes // 2 :: lanes] = middle[::lanes]
     if base != 40:
         # Places beyond either end give some sample or other: what counts is that it is one.
         index[:] = rng.integers(-(2**31), 2**31, index.size)
     ways = np.zeros((2, 4, index.size), np.float32)
-    for way, number in zip(ways, (pairs, 0), strict=True):
+    for way, number in zip(ways, (windows, 0), strict=True):
         call_copy(number, index, np.int64(base), table, *way)
     if base == 40:
         np.testing.assert_array_equal(ways[0], ways[1])
     assert np.isin(ways, table).all()
 
 
-def test_wide_and_narrow_groups_get_their_windows():
-    few = [call_pairs(reach) for reach in (0, 13, 14, 29, 30, 1000)]
-    assert few in ([1, 1, 2, 2, 0, 0], [0] * 6)
+@pytest.mark.parametrize("taps", [2, 4])
+def test_a_window_holds_all_samples_of_a_group(taps):
+    widest = {16: 64, 8: 8}[call_lanes()]
+    for reach in range(70):
+        windows = call_windows(reach, taps)
+        size = windows * (32 if widest == 64 else 8)
+        # Half a window lies on either side of the middle place, the taps beyond the last one.
+        assert windows == 0 or 2 * reach + taps <= size
+        if widest == 64:
+            assert windows == (1 if 2 * reach + taps <= 32 else 2 * (2 * reach + taps <= 64))
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +133,70 @@ def test_images_of_any_width_hold_the_same_pixels(signal, rail, count):
     np.testing.assert_allclose(part, whole[..., :count], atol=1e-5 * np.abs(whole).max())
 
 
+# First x, spacing, first y, and what is added to the receivers and to the heights of all pixels.
+GEOMETRIES = {
+    "the paper's": (-1.5, 0.02, 10.0, 0.0, 0.0),
+    "coarse": (-3.0, 0.05, 10.0, 0.0, 0.0),
+    "aside": (5.0, 0.03, 4.0, 0.0, 0.0),
+    "below": (-0.7, 0.01, 0.3, 0.0, 0.0),
+    "close by": (-0.7, 0.01, 0.3, 0.0, 1.9),
+    "array": (-1.5, 0.02, 10.0, [0.4, -0.2, 0.3], 0.0),
+}
+
+
+@pytest.mark.parametrize("cubic", [False, True])
+@pytest.mark.parametrize("relief", [0.0, 0.3])
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_back_projection_from_any_positions_is_the_double_precision_sum(geometry, relief, cubic):
+    x_first, spacing, y_first, apart, above = GEOMETRIES[geometry]
+    rng = np.random.default_rng(11)
+    x, y = x_first + spacing * np.arange(150), y_first + spacing * np.arange(3)
+    z = above + relief * np.sin(3 * x) * np.cos(y)[:, None]
+    transmitter = rng.uniform([-0.4, -0.3, 1.9], [0.4, 0.1, 2.4], (9, 3))
+    receiver = transmitter + apart
+    extra = rng.uniform(-0.05, 0.05, 9)
+    pixels = np.stack([*np.meshgrid(x, y), z], axis=-1)
+    distance = extra[:, None, None] + 0.5 * sum(
+        np.linalg.norm(pixels - antennas[:, None, None], axis=-1)
+        for antennas in (transmitter, receiver)
+    )
+    first, step, cycles = distance.min() - 0.1, 0.0125 if cubic else 0.005, 93.4
+    count = int((distance.max() + 0.1 - first) / step)
+    profile = np.zeros((2, 9, count + lookup.PADDING), np.float32)
+    profile[..., :count] = rng.normal(size=(2, 9, count))
+    found = np.zeros(z.shape, np.complex64)
+    backprojection.accumulate(
+        found, x, y, z, transmitter, receiver, extra, profile[0], profile[1], first, step, cycles,
+        cubic,
+    )  # fmt: skip
+    place = (distance - first) / step
+    index = np.floor(place).astype(int)
+    share = place - index
+    # B-splines of degree 3 and 1, by their distance from the place.
+    away = np.abs(share - np.arange(-1, 3)[:, None, None, None])
+    wide = np.where(away < 1, 2 / 3 - away**2 * (1 - away / 2), (2 - away).clip(0) ** 3 / 6)
+    weights = wide if cubic else (1 - away).clip(0)
+    position = np.arange(9)[:, None, None]
+    taps = [
+        weight * (profile[0] + 1j * profile[1])[position, index + tap - 1]
+        for tap, weight in enumerate(weights)
+    ]
+    exact = np.sum(sum(taps) * np.exp(2j * np.pi * (distance * cycles % 1)), axis=0)
+    assert decibels(found, exact) < -100
+
+
+def test_positions_that_are_not_numbers_read_no_foreign_memory():
+    x, y = np.linspace(-1, 1, 40), np.array([10.0, 10.1])
+    antennas = np.array([[0.0, 0.0, np.nan], [1e9, 0.0, 2.0], [0.0, 0.0, -np.inf]])
+    profile = np.ones((3, 100 + lookup.PADDING), np.float32)
+    for cubic in (False, True):
+        image_ = np.zeros((2, 40), np.complex64)
+        backprojection.accumulate(
+            image_, x, y, np.zeros((2, 40)), antennas, antennas, np.zeros(3), profile, profile, 9.0,
+            0.01, 93.4, cubic,
+        )  # fmt: skip
+
+
 @pytest.mark.parametrize(("oversampling", "expected"), [(4, -79), (6, -93), (8, -103)])
 def test_cubic_interpolation_errs_as_published(scatterers, rail, oversampling, expected):
     rng = np.random.default_rng(4)
@@ -154,8 +232,9 @@ def test_splatting_is_the_adjoint_of_back_projection():
     padded[..., :period] = np.moveaxis(profile, -1, 0)
     focused = np.zeros((30, 40), np.complex64)
     backprojection.accumulate(
-        focused, x, y, surface, antennas, others, padded[0], padded[1], 0.0, step, cycles, True
-    )
+        focused, x, y, surface, antennas, others, np.zeros(5), padded[0], padded[1], 0.0, step,
+        cycles, True,
+    )  # fmt: skip
     place = np.stack([*np.meshgrid(x, y), surface]).reshape(3, -1)
     spread = np.zeros((5, period + splat.TAPS), np.complex64)
     for bins, out, back in zip(spread, antennas, others, strict=True):
@@ -273,18 +352,19 @@ def test_positions_that_are_not_numbers_are_refused(scatterers, rail):
 
 IMAGE = """
 import numpy as np
-from vinsar.kernels import {module}
+from vinsar.kernels import backprojection, rail
 rng = np.random.default_rng(0)
 x, y = np.linspace(-0.4, 0.4, 33), np.linspace(5, 6, 4)
 antennas = np.stack([np.linspace(-0.1, 0.1, 5), np.zeros(5), np.full(5, 2.0)], axis=1)
 profiles = rng.normal(size=(2, 5, 700)).astype(np.float32)
 images = np.zeros((2, 4, 33), np.complex64)
 for image, cubic in zip(images, (False, True)):
-    {module}.accumulate(image, {arguments}, profiles[0], profiles[1], 4.0, 0.01, 93.4, cubic)
+    {kernel}.accumulate(image, {arguments}, profiles[0], profiles[1], 4.0, 0.01, 93.4, cubic)
 np.save({path!r}, images)
 """
 ARGUMENTS = {
-    "backprojection": "x, y, np.zeros((4, 33)), antennas, antennas",
+    "backprojection": "x, y, np.zeros((4, 33)), antennas, antennas, np.zeros(5)",
+    "surface": "x, y, 0.1 * np.outer(y, x), antennas, antennas + 0.1, np.ones(5)",
     "rail": "x[0], 0.025, y, np.zeros(4), antennas[0], antennas[0], 0.05, 1, 2",
 }
 
@@ -301,27 +381,32 @@ def python(code, **environment):
     return result.stdout
 
 
-@pytest.mark.parametrize("module", ARGUMENTS)
-def test_machines_without_avx_512_and_plain_python_make_the_same_image(tmp_path, module):
+@pytest.mark.parametrize("case", ARGUMENTS)
+def test_machines_without_avx_512_and_plain_python_make_the_same_image(tmp_path, case):
     ways = {
         "here": {},
-        "portable": {
-            "NUMBA_CPU_NAME": "generic",
-            "NUMBA_CPU_FEATURES": "",
-            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-        },
+        "avx2": {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx,+avx2,+fma"},
+        "portable": {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""},
         "python": {"NUMBA_DISABLE_JIT": "1"},
     }
+    if not binding.get_host_cpu_features().get("avx2"):
+        ways.pop("avx2")
     made = {}
     for name, environment in ways.items():
         path = str(tmp_path / f"{name}.npy")
-        code = IMAGE.format(module=module, arguments=ARGUMENTS[module], path=path)
+        code = IMAGE.format(
+            kernel="rail" if case == "rail" else "backprojection",
+            arguments=ARGUMENTS[case],
+            path=path,
+        )
+        if name != "here":
+            environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
         python(code, PYTHONPATH=str(PACKAGE.parent), **environment)
         made[name] = np.load(path)
     # They round and fuse differently: single precision's -100 dB.
-    for name in ("portable", "python"):
+    for name in ways.keys() - {"here"}:
         for found, exact in zip(made[name], made["here"], strict=True):
-            assert decibels(found, exact) < -100
+            assert np.linalg.norm(found - exact) < 1e-5 * np.linalg.norm(exact)
 
 
 HITS = """

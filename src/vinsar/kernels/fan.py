@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vinsar.kernels.compiling import helper, kernel
-from vinsar.kernels.lookup import LANES, PADDING, copy, pairs_for
+from vinsar.kernels.lookup import LANES, PADDING, copy, lanes, windows_for
 
 __all__ = ["PADDING", "sweep"]
 
@@ -117,8 +117,8 @@ def sweep(
                 floor = np.floor(column)
                 fraction[i] = column - floor
                 index[i] = np.int32(floor)
-            pairs = pairs_for(np.ceil(step * (LANES // 2)))
-            copy(pairs, index, np.int64(0), height[row], (here, there))
+            windows = windows_for(np.ceil(step * (lanes() // 2)), 2)
+            copy(windows, index, np.int64(0), height[row], (here, there))
             inverse, up = np.float32(1 / distance), np.float32(antenna[2])
             line = horizon[begin:]
             for i in range(end - begin):

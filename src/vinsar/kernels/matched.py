@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import types
+from numba import config, types
 from numba.extending import intrinsic
 
 from vinsar.kernels.compiling import part
-from vinsar.kernels.lookup import FLAGS, INTS, LANES, PADDING, Emitter, contiguous, permutes
+from vinsar.kernels.lookup import Emitter, contiguous, lanes
 
 
-def _window_adder(pairs: int) -> Any:
+def _adder(windows: int) -> Any:
     @intrinsic
-    def add_window(  # type: ignore[no-untyped-def]
+    def add_group(  # type: ignore[no-untyped-def]
         typingctx, begin, index, base, real, imag, weights, cosine, sine, sum_real, sum_imag
     ):
-        """Do what `add` does for `LANES` pixels whose samples lie within one window."""
+        """Do what `add` does for a group of pixels, from a window or from single samples."""
         del typingctx
         if not contiguous(index, real, imag, weights, cosine, sine, sum_real, sum_imag):
             return None
@@ -26,43 +26,63 @@ def _window_adder(pairs: int) -> Any:
         )  # fmt: skip
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            # Without the instruction it is never reached: there are no pairs then.
-            if permutes(context):
-                emit = Emitter(context, builder, signature, arguments)
-                at = arguments[0]
-                taps = weights.count
-                parts = emit.array(3), emit.array(4)
+            emit = Emitter(context, builder, signature, arguments, 0 if windows else 8)
+            if not emit.has(windows):
+                return context.get_dummy_value()
+            at, indices, taps = arguments[0], emit.array(1), 4 if weights.count == 4 else 2
+            parts = emit.array(3), emit.array(4)
+            if windows:
                 start, places = emit.window(
-                    emit.load(emit.array(1), at, INTS), arguments[2], parts[0], pairs
+                    emit.load(indices, at, emit.ints), arguments[2], parts[0], taps, windows
                 )
-                factors = [emit.load(emit.array(5, tap), at) for tap in range(taps)]
-                values = []
-                for part_ in parts:
-                    found = emit.look_up(part_, start, places, taps, pairs)
-                    value = builder.fmul(factors[0], found[0], flags=FLAGS)
+                looked_up = [emit.look_up(part_, start, places, taps, windows) for part_ in parts]
+            else:
+                looked_up = [emit.gather(part_, indices, at, arguments[2], taps) for part_ in parts]
+            factors = [emit.load(emit.array(5, item), at) for item in range(weights.count)]
+            values = []
+            for found in looked_up:
+                if taps == 2:
+                    value = emit.fused(factors[0], emit.minus(found[1], found[0]), found[0])
+                else:
+                    value = emit.times(factors[0], found[0])
                     for factor, sample in zip(factors[1:], found[1:], strict=True):
                         value = emit.fused(factor, sample, value)
-                    values.append(value)
-                a, b = values
-                c, s = emit.load(emit.array(6), at), emit.load(emit.array(7), at)
-                reals, imags = emit.array(8), emit.array(9)
-                real_ = emit.fused(a, c, emit.load(reals, at))
-                turned = builder.fmul(b, s, flags=FLAGS)
-                emit.store(builder.fsub(real_, turned, flags=FLAGS), reals, at)
-                emit.store(emit.fused(b, c, emit.fused(a, s, emit.load(imags, at))), imags, at)
+                values.append(value)
+            a, b = values
+            c, s = emit.load(emit.array(6), at), emit.load(emit.array(7), at)
+            reals, imags = emit.array(8), emit.array(9)
+            real_ = emit.fused(a, c, emit.load(reals, at))
+            emit.store(emit.minus(real_, emit.times(b, s)), reals, at)
+            emit.store(emit.fused(b, c, emit.fused(a, s, emit.load(imags, at))), imags, at)
             return context.get_dummy_value()
 
         return types.void(*arguments_types), generate
 
-    return add_window
+    return add_group
 
 
-_add_from_pair, _add_from_pairs = _window_adder(1), _window_adder(2)
+_add_singles, _add_from_one, _add_from_two = (_adder(windows) for windows in range(3))
+
+if config.DISABLE_JIT:  # Then the kernels are plain Python.
+
+    def _add_singles(  # type: ignore[no-untyped-def]
+        begin, index, base, real, imag, weights, cosine, sine, sum_real, sum_imag
+    ):
+        group = slice(begin, begin + 8)
+        places = base + index[group].astype(np.int64)
+        samples = [real[places + tap] + 1j * imag[places + tap] for tap in range(4)]
+        if len(weights) == 1:
+            value = samples[0] + weights[0][group] * (samples[1] - samples[0])
+        else:
+            value = sum(w[group] * sample for w, sample in zip(weights, samples, strict=True))
+        turned = value * (cosine[group] + 1j * sine[group])
+        sum_real[group] += turned.real
+        sum_imag[group] += turned.imag
 
 
 @part
 def add(
-    pairs: int,
+    windows: int,
     index: Any,
     base: int,
     weights: Any,
@@ -77,10 +97,17 @@ def add(
 
     Parameters
     ----------
-    pairs, index, base
-        As in `lookup.copy`: the first sample of the profile that each pixel reads.
+    windows
+        From `lookup.windows_for`, for all groups.
+    index
+        The first sample of the profile that each pixel reads, less the base (pixel,), int32, a
+        multiple of `lookup.LANES`.
+    base
+        What to add to them, int64. The sums must lie within the profile, except for
+        `lookup.PADDING`.
     weights
-        For each sample that a pixel reads, in order, its weight (pixel,), float32.
+        The weights of the four samples that a pixel reads, or only that of the second of two, the
+        first having the rest: tuple of (pixel,), float32.
     cosine, sine
         Phasor of the carrier's phase (pixel,), float32.
     profile_real, profile_imag
@@ -88,27 +115,21 @@ def add(
     sum_real, sum_imag
         Output (pixel,), float32.
     """
-    if pairs == 1:
-        for begin in range(0, index.size, LANES):
-            _add_from_pair(
+    if windows == 1:
+        for begin in range(0, index.size, lanes()):
+            _add_from_one(
                 np.int64(begin), index, base, profile_real, profile_imag, weights, cosine, sine,
                 sum_real, sum_imag,
             )  # fmt: skip
-    elif pairs == 2:
-        for begin in range(0, index.size, LANES):
-            _add_from_pairs(
+    elif windows == 2:
+        for begin in range(0, index.size, lanes()):
+            _add_from_two(
                 np.int64(begin), index, base, profile_real, profile_imag, weights, cosine, sine,
                 sum_real, sum_imag,
             )  # fmt: skip
     else:
-        last = profile_real.size - PADDING
-        for i in range(index.size):
-            # Unsigned, so that no negative index needs a look.
-            k = np.uint64(min(max(base + index[i], 0), last))
-            a = weights[0][i] * profile_real[k]
-            b = weights[0][i] * profile_imag[k]
-            for tap in range(1, len(weights)):
-                a += weights[tap][i] * profile_real[k + np.uint64(tap)]
-                b += weights[tap][i] * profile_imag[k + np.uint64(tap)]
-            sum_real[i] += a * cosine[i] - b * sine[i]
-            sum_imag[i] += a * sine[i] + b * cosine[i]
+        for begin in range(0, index.size, 8):
+            _add_singles(
+                np.int64(begin), index, base, profile_real, profile_imag, weights, cosine, sine,
+                sum_real, sum_imag,
+            )  # fmt: skip

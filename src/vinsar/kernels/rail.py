@@ -12,11 +12,10 @@ import numpy as np
 
 from vinsar.kernels.compiling import kernel
 from vinsar.kernels.functions import phasor, spline
-from vinsar.kernels.lookup import LANES, pairs_for
+from vinsar.kernels.lookup import LANES, PADDING, lanes, windows_for
 from vinsar.kernels.matched import add
 
 _TILE = 256
-_ONE = np.float32(1)
 
 
 @kernel
@@ -62,9 +61,12 @@ def accumulate(
     # How many pixels the last position's piece lies before the first one's.
     lead = stride * ((positions - 1) // classes)
     length = lead + (columns + LANES - 1) // LANES * LANES
+    # No sample is read outside the profile.
+    taps, before = (4, 1) if cubic else (2, 0)
+    last = float(profile_real.shape[1] - PADDING)
     index = np.empty((classes, length), np.int32)
     weights = np.empty((4, classes, length), np.float32)
-    fraction = np.empty(length, np.float32)
+    fraction = np.empty((classes, length), np.float32)
     turn = np.empty(length, np.float32)
     cosine = np.empty((classes, length), np.float32)
     sine = np.empty((classes, length), np.float32)
@@ -84,24 +86,21 @@ def accumulate(
                 )
                 place = (distance - first_range) / range_step
                 floor = np.floor(place)
-                index[kind, i] = np.int32(floor)
-                fraction[i] = np.float32(place - floor)
+                index[kind, i] = np.int32(min(max(float(before), floor), last))
+                fraction[kind, i] = np.float32(place - floor)
                 cycles = distance * cycles_per_metre
                 turn[i] = np.float32(cycles - np.floor(cycles + 0.5))
             for i in range(length):
                 cosine[kind, i], sine[kind, i] = phasor(turn[i])
             if cubic:
                 for i in range(length):
-                    w0, w1, w2, w3 = spline(fraction[i])
+                    w0, w1, w2, w3 = spline(fraction[kind, i])
                     weights[0, kind, i], weights[1, kind, i] = w0, w1
                     weights[2, kind, i], weights[3, kind, i] = w2, w3
-            else:
-                for i in range(length):
-                    weights[0, kind, i], weights[1, kind, i] = _ONE - fraction[i], fraction[i]
-            for i in range(length - LANES // 2):
+            for i in range(length - lanes() // 2):
                 # Range is convex in x: in between, indices are no further apart.
-                reach = max(reach, abs(index[kind, i + LANES // 2] - index[kind, i]))
-        pairs = pairs_for(reach)
+                reach = max(reach, abs(index[kind, i + lanes() // 2] - index[kind, i]))
+        windows = windows_for(reach, taps)
         for begin in range(0, columns, _TILE):
             used = min(_TILE, columns - begin)
             width = (used + LANES - 1) // LANES * LANES
@@ -119,14 +118,13 @@ def accumulate(
                         weights[2, kind, piece], weights[3, kind, piece],
                     )  # fmt: skip
                     add(
-                        pairs, places, np.int64(-1), four, turns[0], turns[1], real, imag,
+                        windows, places, np.int64(-1), four, turns[0], turns[1], real, imag,
                         sums[0, :width], sums[1, :width],
                     )  # fmt: skip
                 else:
-                    two = weights[0, kind, piece], weights[1, kind, piece]
                     add(
-                        pairs, places, np.int64(0), two, turns[0], turns[1], real, imag,
-                        sums[0, :width], sums[1, :width],
+                        windows, places, np.int64(0), (fraction[kind, piece],), turns[0], turns[1],
+                        real, imag, sums[0, :width], sums[1, :width],
                     )  # fmt: skip
             for i in range(used):
                 image[row, begin + i] += np.complex64(complex(sums[0, i], sums[1, i]))

@@ -194,6 +194,7 @@ def backproject(
     y: NDArray[np.floating],
     z: ArrayLike = 0.0,
     window: waveform.WindowName = "rectangular",
+    extra_range_m: NDArray[np.floating] | None = None,
 ) -> xr.Dataset:
     """Back-project the profiles onto a surface, by default the ground plane.
 
@@ -215,6 +216,9 @@ def backproject(
         Height of the surface, a number or (y, x), m.
     window
         Weighting of the antenna positions.
+    extra_range_m
+        What to add to the half paths ``rho_l`` of each (channel, position), such as an estimated
+        error of the positions along the line of sight, m; by default nothing.
 
     Returns
     -------
@@ -224,8 +228,8 @@ def backproject(
     Raises
     ------
     ValueError
-        If profiles and trajectory differ in their positions, or the profiles do not cover the
-        grid.
+        If profiles, trajectory and extra ranges differ in their positions, or the profiles do not
+        cover the grid.
     """
     from vinsar.kernels import backprojection, rail
 
@@ -236,10 +240,19 @@ def backproject(
             f"profiles of {samples.shape[:2]} channels and positions do not fit a trajectory of "
             f"{transmitter.shape[:2]}"
         )
+    extra = (
+        np.zeros(samples.shape[:2]) if extra_range_m is None else np.asarray(extra_range_m, float)
+    )
+    if extra.shape != samples.shape[:2] or not np.isfinite(extra).all():
+        raise ValueError(
+            f"extra ranges of {extra.shape} do not give a number for each of {samples.shape[:2]} "
+            "channels and positions"
+        )
     slant_range = profiles["slant_range"].values
     spacing = float(slant_range[-1] - slant_range[0]) / (slant_range.size - 1)
     cubic = profiles["profile"].attrs.get("interpolation", "linear") == "cubic"
     near, far = trajectory.range_extent(trajectory_, x, y, z)
+    near, far = near + min(0.0, extra.min()), far + max(0.0, extra.max())
     # A cubic reads one sample more on either side.
     spare = spacing if cubic else 0.0
     if near < slant_range[0] + spare or far > slant_range[-1] - spare:
@@ -253,7 +266,10 @@ def backproject(
     for part, values in zip(parts, (samples.real, samples.imag), strict=True):
         part[..., : slant_range.size] = values * weights[:, None].astype(np.float32)
     surface = np.ascontiguousarray(np.broadcast_to(np.asarray(z, dtype=float), (y.size, x.size)))
-    rails = [_rail(x, surface, *ends) for ends in zip(transmitter, receiver, strict=True)]
+    rails = [
+        None if some.any() else _rail(x, surface, *ends)
+        for some, *ends in zip(extra, transmitter, receiver, strict=True)
+    ]
     carrier = float(profiles["carrier_frequency"])
     image = np.zeros((samples.shape[0], y.size, x.size), dtype=np.complex64)
     sampling = float(slant_range[0]), spacing, 2 * carrier / SPEED_OF_LIGHT, cubic
@@ -264,7 +280,7 @@ def backproject(
         data = parts[0, channel], parts[1, channel], *sampling
         if regular is None:
             backprojection.accumulate(
-                image[channel, rows], x, y[rows], surface[rows], out, back, *data
+                image[channel, rows], x, y[rows], surface[rows], out, back, extra[channel], *data
             )
         else:
             rail.accumulate(
