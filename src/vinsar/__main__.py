@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from vinsar import measure
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
 from vinsar.results import lineage, reproduction
@@ -159,6 +160,7 @@ def main() -> int:
     export.add_argument("folder")
     export.add_argument("file")
     export.set_defaults(answer=_export)
+    measure.add_commands(commands)
     schema = commands.add_parser("schema", help="print the JSON schema of a study's file")
     schema.set_defaults(answer=_schema)
     arguments = parser.parse_args()
