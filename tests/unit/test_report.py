@@ -15,7 +15,7 @@ import yaml
 
 from vinsar import figures, report
 from vinsar.figures.drawing import style
-from vinsar.foundations import variables
+from vinsar.foundations import tables, variables
 from vinsar.foundations.configuration import Study
 from vinsar.report import content
 from vinsar.results import lineage
@@ -179,15 +179,9 @@ def test_what_a_study_changes_is_listed_and_no_more() -> None:
     assert found.rows == (("`radar.baseline_m`", "0.3 m", "0.5 m"),)
 
 
-def test_markdown_tables_are_read_to_their_end() -> None:
-    text = "# T\n\n| a | b |\n|---|:-:|\n| 1 | `x` |\n\nafter\n\n| no | more |\n"
-    assert content.markdown_table(text) == [("a", "b"), ("1", "`x`")]
-    assert content.markdown_table("none") == []
-
-
 def test_errata_of_the_documentation_are_read_whole() -> None:
     text = (ROOT / "docs/errata.md").read_text(encoding="utf-8")
-    rows = content.markdown_table(text)
+    rows = tables.read(text)
     assert {len(row) for row in rows} == {4}
     assert len(rows) == sum(line.startswith("|") for line in text.splitlines()) - 1
 

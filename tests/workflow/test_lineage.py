@@ -42,13 +42,13 @@ def test_every_kind_of_damage_is_found_and_named(copy):
 
 
 def test_other_code_and_configuration_make_results_stale(copy):
-    code = copy.folder / "src/vinsar/filtering.py"
+    code = copy.folder / "src/vinsar/processing/filtering.py"
     code.write_text(code.read_text() + "\n_EDITED = True\n")
     tiny = copy.folder / "tiny.yaml"
     tiny.write_text(tiny.read_text() + "seed: 1\n")
     done = copy.ask("verify", "results/tiny", *CONFIG)
     assert done.returncode == 1
-    assert "filtered.nc: stale: code src/vinsar/filtering.py has changed" in done.stdout
+    assert "filtered.nc: stale: code src/vinsar/processing/filtering.py has changed" in done.stdout
     assert "facets.nc: stale: configuration seed was 2014, is 1" in done.stdout
     assert "images.nc:" not in done.stdout
 

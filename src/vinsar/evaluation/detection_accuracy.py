@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.foundations import variables
+from vinsar.foundations import tables, variables
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
 from vinsar.processing.detection import FREE, UNKNOWN, regions
@@ -273,30 +273,32 @@ def as_markdown(sweep: xr.Dataset, objects: Sequence[SceneObject], options: Dete
     cases = [sweep.isel({key: number}) for number in range(sweep.sizes[key])]
     label = sweep[key].attrs["long_name"]
     least = 100 * options.threshold_m
+    rows: list[tuple[str, ...]] = []
+    for case in cases:
+        both = curves(case, options.threshold_m)
+        at = int(np.abs(both["height"].threshold - options.threshold_m).argmin())
+        rows.append(
+            (
+                f"{float(case[key]):g}",
+                _reached(both["height"], _metres),
+                _reached(both["amplitude"], _decibels),
+                f"{both['height'].false_alarms[at]:.2g}",
+                f"{100 * both['height'].probability[at]:.1f} %",
+            )
+        )
     lines = [
         f"False alarms on 100 m2 where {100 * WANTED:g} % of the obstacles of {least:g} cm and "
         f"more are found, with the threshold, and on the heights at {least:g} cm:",
         "",
-        f"| {label} | heights | image alone | heights at {least:g} cm | found there |",
-        "|---|---|---|---|---|",
-    ]
-    for case in cases:
-        both = curves(case, options.threshold_m)
-        at = int(np.abs(both["height"].threshold - options.threshold_m).argmin())
-        lines.append(
-            f"| {float(case[key]):g} | {_reached(both['height'], _metres)} | "
-            f"{_reached(both['amplitude'], _decibels)} | {both['height'].false_alarms[at]:.2g} | "
-            f"{100 * both['height'].probability[at]:.1f} % |"
-        )
-    heads = " | ".join(f"{float(case[key]):g}" for case in cases)
-    lines += [
+        tables.write(
+            (label, "heights", "image alone", f"heights at {least:g} cm", "found there"), rows
+        ),
         "",
         f"Probability of detection on the heights at {least:g} cm by {label}, and shares of the "
         f"object's ground on the map at {label} = {float(cases[len(cases) // 2][key]):g}:",
         "",
-        f"| object | height (m) | at y (m) | {heads} | alarm | unknown | free |",
-        "|---|---|---|" + "---|" * (len(cases) + 3),
     ]
+    rows = []
     mean = cases[len(cases) // 2].mean("realization")
     for number, part in enumerate(objects):
         found = [
@@ -309,12 +311,14 @@ def as_markdown(sweep: xr.Dataset, objects: Sequence[SceneObject], options: Dete
             for case in cases
         ]
         unknown, free = (float(mean[f"object_{name}"][number]) for name in ("unknown", "free"))
-        lines.append(
-            f"| {part.shape} | {_height(part):g} | {part.y_m:g} | "
-            + " | ".join(f"{share:.2f}" for share in found)
-            + f" | {abs(1 - unknown - free):.2f} | {unknown:.2f} | {free:.2f} |"
-        )
+        shares = (*found, abs(1 - unknown - free), unknown, free)
+        named = (part.shape, f"{_height(part):g}", f"{part.y_m:g}")
+        rows.append((*named, *(f"{share:.2f}" for share in shares)))
+    heads = [f"{float(case[key]):g}" for case in cases]
     lines += [
+        tables.write(
+            ("object", "height (m)", "at y (m)", *heads, "alarm", "unknown", "free"), rows
+        ),
         "",
         f"Of the true shadow the map has {100 * float(mean['shadow_unknown']):.0f} % as unknown, "
         f"of visible ground beside objects {100 * float(mean['visible_unknown']):.1f} %. "

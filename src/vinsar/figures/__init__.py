@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vinsar.figures.drawing.declaration import Figure
 from vinsar.figures.drawing.files import save
@@ -19,12 +19,32 @@ from vinsar.figures.drawing.thumbnails import Thumbnail
 from vinsar.foundations.errors import ConfigurationError, Fault
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable, Iterator
+    from types import ModuleType
 
     from vinsar.foundations.configuration import Study
 
 
 __all__ = ["FIGURES", "MODULES", "THUMBNAILS", "Figure", "Thumbnail", "check", "colormap", "save"]
+
+
+def _modules() -> Iterator[ModuleType]:
+    for found in pkgutil.iter_modules(__path__):
+        if not found.ispkg:
+            yield importlib.import_module(f"{__name__}.{found.name}")
+
+
+def _declared(modules: Iterable[ModuleType], attribute: str) -> dict[str, tuple[ModuleType, Any]]:
+    """Return what modules declare under an attribute: by name, the module and the declaration."""
+    found: dict[str, tuple[ModuleType, Any]] = {}
+    for module in modules:
+        for name, value in getattr(module, attribute, {}).items():
+            if name in found:
+                both = f"{found[name][0].__name__} and {module.__name__}"
+                raise ValueError(f"'{name}' is declared twice in {attribute}: {both}")
+            found[name] = module, value
+    return found
+
 
 FIGURES: dict[str, Figure] = {}
 """The figures by name."""
@@ -32,28 +52,14 @@ FIGURES: dict[str, Figure] = {}
 MODULES: dict[str, str] = {}
 """The module that declares each figure, as ``figures.chain``."""
 
-THUMBNAILS: dict[str, Thumbnail] = {}
+for _name, (_module, _figure) in _declared(_modules(), "FIGURES").items():
+    FIGURES[_name] = _figure
+    MODULES[_name] = _module.__name__.removeprefix("vinsar.")
+
+THUMBNAILS: dict[str, Thumbnail] = {
+    name: thumbnail for name, (_, thumbnail) in _declared(_modules(), "THUMBNAILS").items()
+}
 """The small pictures by product."""
-
-
-def _discover() -> None:
-    """Gather what the modules of the folder declare."""
-    for found in pkgutil.iter_modules(__path__):
-        if found.ispkg:
-            continue
-        module = importlib.import_module(f"{__name__}.{found.name}")
-        declared = getattr(module, "FIGURES", {})
-        pictures = getattr(module, "THUMBNAILS", {})
-        twice = [*(declared.keys() & FIGURES.keys()), *(pictures.keys() & THUMBNAILS.keys())]
-        if not declared or twice:
-            what = f"declares {', '.join(sorted(twice))} once more" if twice else "has no FIGURES"
-            raise ValueError(f"{module.__name__} {what}; shared code lies in figures.drawing")
-        FIGURES.update(declared)
-        THUMBNAILS.update(pictures)
-        MODULES.update(dict.fromkeys(declared, f"figures.{found.name}"))
-
-
-_discover()
 
 
 def check(study: Study, products: Collection[str]) -> None:

@@ -56,7 +56,7 @@ class Layout:
     common
         Position (y, z) of that end, m; none on a rail.
     aside
-        x of S1 and S2, m: the target stands at 0.
+        x of S1 and S2, m; the target is at x = 0.
     """
 
     lower: NDArray[np.float64]
@@ -249,7 +249,7 @@ def _side(
 
 
 def _vehicle(axes: Axes, height: float) -> None:
-    """Draw a vehicle of the rail's height; its shape stands for none in particular."""
+    """Draw a vehicle of the rail's height; its shape is that of no particular vehicle."""
     from matplotlib.patches import Circle, Polygon
 
     outline = np.array(

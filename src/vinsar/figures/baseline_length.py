@@ -212,12 +212,12 @@ FIGURES = {
         draw=draw,
         title="Length of the baseline",
         caption=(
-            "Height error against the length of the baseline: standard deviation over the "
-            "whole scene and on visible ground, and 1.48 median absolute deviations, which "
-            "leave out the cells that unwrapped to another cycle. The bound is that of Cramer "
+            "Height error against the length of the baseline: standard deviation over the whole "
+            "scene and on visible ground, and 1.48 times the median absolute deviation, which "
+            "disregards the cells that unwrapped to another cycle. The bound is that of Cramer "
             "and Rao for a resolution cell's looks in the coherence window, once with the "
-            "coherence 1 - B/B_crit of level ground and once with the one measured; the phase "
-            "filter averages over more than that window."
+            "coherence of level ground and once with the measured one; the phase filter averages "
+            "over more than that window."
         ),
         sections=("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
         sweeps=("baseline_length",),

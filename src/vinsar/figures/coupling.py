@@ -175,9 +175,9 @@ FIGURES = {
         draw=draw,
         title="Coupling of transmitter and receiver",
         caption=(
-            "The coupling of transmitter and receiver: mean power of the range profiles with "
-            "and without it; the spread of the height error on visible ground against its "
-            "level; and what its suppression leaves of a point target's amplitude, computed "
+            "The coupling of transmitter and receiver: mean power of the range profiles with and "
+            "without it; the spread of the height error on visible ground against its level; and "
+            "the share of a point target's amplitude that its suppression leaves, computed "
             "(lines) and imaged (marks)."
         ),
         sections=("figures",),

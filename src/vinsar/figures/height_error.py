@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _REGIONS = {"whole_scene": "whole scene", "visible_ground": "visible ground", "shadow": "shadow"}
 _BINS_PER_TOLERANCE = 10
-# Beyond this many tolerances a height has failed, and its size says no more.
+# Beyond this many tolerances a height has failed, by whatever amount.
 _HISTOGRAM_TOLERANCES = 20
 
 

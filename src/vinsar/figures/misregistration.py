@@ -1,4 +1,4 @@
-"""Fig. 2: how far the two images shift against each other, by the height of the target."""
+"""Fig. 2: the misregistration of the two images by the height of the target."""
 
 from __future__ import annotations
 
@@ -179,12 +179,12 @@ def _shifts(axes: Axes, product: xr.Dataset, options: Figures) -> None:
 FIGURES = {
     "fig2": declaration.Figure(
         draw=draw,
-        title="Registration error",
+        title="Misregistration",
         caption=(
-            "Registration error of a raised target against its height, near and far: Eqs. 6-7 "
-            "as the paper has them, the points of equal path and slope (a circle around a "
-            "rail's axis, an ellipse for an array), and what imaged point targets measure. The "
-            "band is a tenth of a resolution cell."
+            "Misregistration of a raised target against its height, near and far: Eqs. 6-7 as "
+            "printed, the points of equal path and slope (a circle around a rail's axis, an "
+            "ellipse for an array), and measured on images of point targets. The band is a tenth "
+            "of a resolution cell."
         ),
         sections=("figures", "radar"),
         inputs=("registration",),

@@ -169,7 +169,7 @@ FIGURES = {
         caption=(
             "Probability of detection against false alarms for the heights and for the image "
             "alone, over realizations of speckle, noise and ground; detection against the "
-            "obstacle's height at three distances; and what the map says of holes."
+            "obstacle's height at three distances; and the classes that the map gives to holes."
         ),
         sections=("figures", "scene", "detection", "sweeps"),
         sweeps=(detection_accuracy.SWEEP,),

@@ -92,7 +92,7 @@ def title(study: Study) -> str:
 
 
 def statistics(accuracy: xr.Dataset) -> list[tuple[str, str]]:
-    """Return what the sheet says of the heights, each as a number and what it is.
+    """Return the statistics of the sheet, each as a number and what it is.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from vinsar.foundations import variables
+from vinsar.foundations import tables, variables
 from vinsar.foundations.configuration import swept_section
 from vinsar.processing import detection
 from vinsar.radar import aperture, formulas, geometry, instrument, trajectory
@@ -139,14 +139,12 @@ def as_json(claims: list[Claim]) -> list[dict[str, Any]]:
 
 def as_markdown(claims: list[Claim]) -> str:
     """Return the claims as a Markdown table with the criteria below it."""
-    lines = [
-        "| claim | where | the paper says | this study finds | verdict |",
-        "|---|---|---|---|---|",
-    ]
-    lines += [f"| {c.id} | {c.where} | {c.paper} | {c.ours} | **{c.verdict}** |" for c in claims]
-    lines += ["", "Criteria:", ""]
-    lines += [f"- **{c.id}**: {c.criterion}" for c in claims]
-    return "\n".join(lines) + "\n"
+    table = tables.write(
+        ("claim", "where", "the paper says", "this study finds", "verdict"),
+        [(c.id, c.where, c.paper, c.ours, f"**{c.verdict}**") for c in claims],
+    )
+    criteria = [f"- **{c.id}**: {c.criterion}" for c in claims]
+    return "\n".join([table, "", "Criteria:", "", *criteria]) + "\n"
 
 
 def _verdict(whole: bool, part: bool) -> Verdict:

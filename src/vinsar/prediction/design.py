@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vinsar.foundations import tables
 from vinsar.foundations.constants import AXES
 from vinsar.radar import aperture, instrument, speckle, trajectory
 from vinsar.radar.instrument import Instrument
@@ -476,12 +477,12 @@ class Sheet:
         return found
 
 
-def _span(values: ArrayLike, form: str) -> str:
-    return " | ".join(
+def _span(values: ArrayLike, form: str) -> list[str]:
+    return [
         # Without the sign of a negative number that rounds to zero.
         "unlimited" if math.isinf(value) else format(value, "z" + form)
         for value in np.ravel(np.asarray(values, float))
-    )
+    ]
 
 
 def as_markdown(sheet: Sheet) -> str:
@@ -518,8 +519,6 @@ def as_markdown(sheet: Sheet) -> str:
         "",
         f"At x = {sheet.x:g} m, for relief and obstacles of {sheet.relief:g} m:",
         "",
-        "| | near | middle | far |",
-        "|---|---:|---:|---:|",
     ]
     resolution, critical = planned.resolution(*place), planned.critical_baseline(*place)
     rows: list[tuple[str, Any, str]] = [
@@ -542,34 +541,35 @@ def as_markdown(sheet: Sheet) -> str:
         ("registration error, raised target (mm)", 1e3 * sheet.registration_shift(y), ".2f"),
         ("shadow behind an obstacle (m)", sheet.shadow_length(y), ".2f"),
     ]
-    lines += [f"| {name} | {_span(values, form)} |" for name, values, form in rows]
+    table = [(name, *_span(values, form)) for name, values, form in rows]
+    lines.append(tables.write(("", "near", "middle", "far"), table, "lrrr"))
     most = 100 * study.accuracy.tolerance_m
     lines += [
         "",
         f"Constant errors, and which move no height of the image by more than {most:g} cm, before "
         "and after the height reference takes its phase constant:",
         "",
-        "| error | unit | cm a unit: near | middle | far | tolerated | with reference |",
-        "|---|---|---:|---:|---:|---:|---:|",
-    ]
-    for error in sheet.offsets():
-        lines.append(
-            f"| {error.name} | {error.unit} | {_span(100 * error.per_unit, '.3f')} "
-            f"| {_amount(error.tolerated)} | {_amount(error.tolerated_referenced)} |"
-        )
-    lines += [
+        tables.write(
+            ("error", "unit", "cm a unit: near", "middle", "far", "tolerated", "with reference"),
+            [
+                (
+                    *(error.name, error.unit, *_span(100 * error.per_unit, ".3f")),
+                    *(_amount(error.tolerated), _amount(error.tolerated_referenced)),
+                )
+                for error in sheet.offsets()
+            ],
+            "llrrrrr",
+        ),
         "",
-        "Position errors drawn anew at each position and for each channel, 1 sigma, with which 95 "
+        "Position errors, independent by position and channel, 1 sigma, with which 95 "
         f"% of the heights stay within {most:g} cm (errors that both channels share, as on a "
         "shaking vehicle or of common receivers, do no more harm than that, and none over level "
         "ground):",
         "",
-        "| along | tolerated (mm) | wavelengths |",
-        "|---|---:|---:|",
     ]
-    for axis, name in enumerate(AXES):
-        std = sheet.tolerated_scatter(axis)
-        lines.append(f"| {name} | {_amount(1e3 * std)} | {_amount(std / planned.wavelength)} |")
+    scatter = [(name, sheet.tolerated_scatter(axis)) for axis, name in enumerate(AXES)]
+    table = [(name, _amount(1e3 * s), _amount(s / planned.wavelength)) for name, s in scatter]
+    lines.append(tables.write(("along", "tolerated (mm)", "wavelengths"), table, "lrr"))
     found = sheet.warnings()
     lines += ["", "Warnings:", ""] if found else ["", "No warnings."]
     lines += [f"- {sentence}" for sentence in found]

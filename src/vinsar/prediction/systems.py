@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from vinsar.foundations import variables
+from vinsar.foundations import tables, variables
 from vinsar.foundations.configuration import swept_section
 from vinsar.foundations.constants import CHANNELS
 from vinsar.radar import instrument, trajectory
@@ -92,23 +92,24 @@ def compare(sweep: xr.Dataset, study: Study) -> list[System]:
 
 def as_markdown(found: list[System]) -> str:
     """Return the comparison as a Markdown table, means over the realizations."""
-    lines = [
-        "| system | positions | resolution in x, y | height of ambiguity | scan time "
-        "| within tolerance | std | visible: within tolerance | visible: std |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
-    ]
+    headings = (
+        *("system", "positions", "resolution in x, y", "height of ambiguity", "scan time"),
+        *("within tolerance", "std", "visible: within tolerance", "visible: std"),
+    )
+    rows = []
     for system in found:
         across, ahead = system.resolution_m
         statistics = system.accuracy.mean("realization")
-        accuracy = " | ".join(
-            f"{100 * float(part['fraction_within_tolerance']):.1f} % "
-            f"| {100 * float(part['std']):.2f} cm"
-            for part in (
-                statistics.sel(region=region) for region in ("whole_scene", "visible_ground")
-            )
-        )
-        lines.append(
-            f"| {system.name} | {system.positions} | {100 * across:.1f} cm, {100 * ahead:.1f} cm "
-            f"| {system.height_of_ambiguity_m:.3f} m | {system.scan_time_s:.3g} s | {accuracy} |"
-        )
-    return "\n".join(lines) + "\n"
+        row = [
+            system.name,
+            f"{system.positions}",
+            f"{100 * across:.1f} cm, {100 * ahead:.1f} cm",
+            f"{system.height_of_ambiguity_m:.3f} m",
+            f"{system.scan_time_s:.3g} s",
+        ]
+        for region in ("whole_scene", "visible_ground"):
+            part = statistics.sel(region=region)
+            row.append(f"{100 * float(part['fraction_within_tolerance']):.1f} %")
+            row.append(f"{100 * float(part['std']):.2f} cm")
+        rows.append(row)
+    return tables.write(headings, rows, "lrrrrrrrr") + "\n"

@@ -1,7 +1,7 @@
 """The report of a study: one content, written as a web page and as a PDF.
 
-`content.build` says what the report holds, `render` how it looks. Neither knows the workflow: what
-a study lacks, such as claims or a true terrain, is left out.
+`content.build` puts its content together, `render` writes it. Neither knows the workflow: what a
+study lacks, such as claims or a true terrain, is left out.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ import numpy as np
 
 from vinsar.figures import FIGURES, THUMBNAILS, Thumbnail, height_error
 from vinsar.figures.drawing import sweeps, thumbnails
+from vinsar.foundations import tables
 from vinsar.radar import formulas, instrument
 from vinsar.radar.trajectory import Radar
 from vinsar.results import lineage
@@ -41,7 +42,7 @@ _MOST_CASES = 20
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph; what stands between backticks is code."""
+    """A paragraph; text between backticks is code."""
 
     text: str
     kind: str = "text"
@@ -159,9 +160,9 @@ class Report:
     Attributes
     ----------
     title, subtitle
-        What stands above it.
+        Written above it.
     sections
-        In order; `summary`, if there is one, stands before the contents.
+        In order; `summary`, if there is one, comes before the table of contents.
     """
 
     title: str
@@ -485,7 +486,7 @@ def _pictures(sources: Sources, *, only: tuple[str, ...] = ()) -> list[Block]:
 
 
 def _narrow(png: Path, study: Study) -> bool:
-    """Tell whether a figure has the width of one column."""
+    """Return whether a figure has the width of one column."""
     from PIL import Image
 
     with Image.open(png) as image:
@@ -519,31 +520,18 @@ def _claims(sources: Sources) -> Section | None:
         (0, 1),
         tuple((claim["id"], claim["criterion"]) for claim in sources.claims),
     )
-    text = "The paper's claims, each decided by the numbers of this study; nothing is by hand."
+    text = "The paper's claims, each decided by a criterion on the numbers of this study."
     return Section("claims", "Claims", (Text(text), table, Text("Criteria:"), criteria))
-
-
-def markdown_table(text: str) -> list[tuple[str, ...]]:
-    """Return the cells of the first table in a Markdown text, headings first."""
-    rows = []
-    for line in text.splitlines():
-        if line.startswith("|"):
-            cells = tuple(cell.strip() for cell in line.strip().strip("|").split("|"))
-            if not all(set(cell) <= set("-: ") for cell in cells):
-                rows.append(cells)
-        elif rows:
-            break
-    return rows
 
 
 def _errata(sources: Sources) -> Section | None:
     # They are of the paper, and so of the study that is held against it.
-    rows = markdown_table(sources.errata) if sources.claims else []
+    rows = tables.read(sources.errata) if sources.claims else []
     if len(rows) < 2:
         return None
     widths = (0, 1.2, 2.4, 0.9)[: len(rows[0])]
     table = Table("errata", rows[0], "l" * len(rows[0]), widths, tuple(rows[1:]))
-    text = "What the paper prints, why it is wrong, and what this study does instead."
+    text = "What the paper prints, why it is wrong, and what this study uses instead."
     return Section("errata", "Errata of the paper", (Text(text), table))
 
 
@@ -553,7 +541,7 @@ def _sweeps(sources: Sources) -> Section | None:
         for sweep in FIGURES[name].sweeps:
             shown_by.setdefault(sweep, []).append(name)
     rows: list[tuple[str, ...]] = []
-    tables: list[Block] = []
+    details: list[Block] = []
     for name, definition in sources.study.sweeps.items():
         product = sources.products.get(f"sweeps/{name}")
         if product is None:
@@ -570,7 +558,7 @@ def _sweeps(sources: Sources) -> Section | None:
         )  # fmt: skip
         if len(definition.over) == 1 and cases <= _MOST_CASES:
             means = _sweep_table(name, next(iter(definition.over)), product)
-            tables += [Text(f"Means over the realizations of `{name}`:"), means]
+            details += [Text(f"Means over the realizations of `{name}`:"), means]
     if not rows:
         return None
     overview = Table(
@@ -580,7 +568,7 @@ def _sweeps(sources: Sources) -> Section | None:
         (0, 1, 0, 0, 0),
         tuple(rows),
     )
-    return Section("sweeps", "Sweeps", (overview, *tables))
+    return Section("sweeps", "Sweeps", (overview, *details))
 
 
 def _sweep_table(name: str, key: str, product: Any) -> Table:
@@ -714,7 +702,9 @@ def _provenance(sources: Sources) -> Section | None:
         (
             Text("The results of this report were made with:"),
             facts,
-            Text("Made again, checked, and traced to configuration, code and seeds:"),
+            Text(
+                "To make them again, check them, and trace them to configuration, code and seeds:"
+            ),
             Code("\n".join(lines)),
             Text(
                 "Each result carries its own provenance; these are the digests of the files, which "

@@ -54,7 +54,7 @@ def as_html(report: Report, provenance: Mapping[str, str]) -> str:
 
 
 def _inline(text: str) -> Any:
-    """Return text as HTML: what stands between backticks is code."""
+    """Return text as HTML: text between backticks is code."""
     from markupsafe import Markup, escape
 
     escaped = str(escape(text))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from vinsar.foundations import tables
 from vinsar.study import pipeline, validation
 
 if TYPE_CHECKING:
@@ -52,22 +53,25 @@ def as_markdown(results: dict[str, xr.Dataset]) -> str:
         A row a variant: whole scene and visible ground.
     """
     tolerance = 100 * float(next(iter(results.values()))["tolerance"])
-    lines = [
-        f"| variant | within {tolerance:g} cm | std | worst | visible: within {tolerance:g} cm | "
-        "visible: std | in shadow |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
+    within = f"within {tolerance:g} cm"
+    rows = []
     for name, accuracy in results.items():
         scene, seen, shadow = (
             accuracy.sel(region=region) for region in ("whole_scene", "visible_ground", "shadow")
         )
-        lines.append(
-            f"| {name} "
-            f"| {100 * float(scene['fraction_within_tolerance']):.1f} % "
-            f"| {100 * float(scene['std']):.2f} cm "
-            f"| {float(scene['maximum_absolute']):.2f} m "
-            f"| {100 * float(seen['fraction_within_tolerance']):.1f} % "
-            f"| {100 * float(seen['std']):.2f} cm "
-            f"| {100 * float(shadow['cell_count']) / float(scene['cell_count']):.1f} % |"
+        rows.append(
+            (
+                name,
+                f"{100 * float(scene['fraction_within_tolerance']):.1f} %",
+                f"{100 * float(scene['std']):.2f} cm",
+                f"{float(scene['maximum_absolute']):.2f} m",
+                f"{100 * float(seen['fraction_within_tolerance']):.1f} %",
+                f"{100 * float(seen['std']):.2f} cm",
+                f"{100 * float(shadow['cell_count']) / float(scene['cell_count']):.1f} %",
+            )
         )
-    return "\n".join(lines) + "\n"
+    headings = (
+        *("variant", within, "std", "worst"),
+        *(f"visible: {within}", "visible: std", "in shadow"),
+    )
+    return tables.write(headings, rows, "lrrrrrr") + "\n"

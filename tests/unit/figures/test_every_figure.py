@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import matplotlib
 import numpy as np
@@ -40,6 +41,14 @@ def test_every_module_of_the_folder_declares_figures_that_read_what_there_is(stu
         assert figure.title
         assert figure.caption.endswith(".")
         assert figure.sheet in {"", *NAMES}
+
+
+def test_a_name_that_two_modules_declare_is_refused():
+    modules = [ModuleType(name) for name in ("one", "two")]
+    for module in modules:
+        module.FIGURES = {"fig1": figures.FIGURES["fig1"]}
+    with pytest.raises(ValueError, match="'fig1' is declared twice in FIGURES: one and two"):
+        figures._declared(modules, "FIGURES")
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -93,7 +93,7 @@ _OF_FIGURE: WeakKeyDictionary[Figure, tuple[Figures | None, float]] = WeakKeyDic
 
 @contextmanager
 def applied(options: Figures | None = None) -> Iterator[None]:
-    """Apply the style within the block, whatever the user's own settings are, and undo it after.
+    """Apply the style within the block, whatever Matplotlib's settings are, and restore them after.
 
     Parameters
     ----------

@@ -89,7 +89,7 @@ def curve(axes: Axes, at: Floats, data: xr.DataArray, look: Look, *, scale: floa
 
 
 def band_patch() -> Any:
-    """Return what stands for the bands in a legend."""
+    """Return the entry for the bands in a legend."""
     from matplotlib.patches import Patch
 
     return Patch(facecolor=_BAND_COLOUR, label=BAND)
@@ -162,8 +162,8 @@ def around(*values: Any, low: float = 0.75, high: float = 1.35) -> tuple[float, 
 def looks(study: Study, sweep: str) -> float:
     """Return the independent looks in the coherence window of a sweep's cases, at least 1.
 
-    The window's area over that of a resolution cell in the middle of the scene. It stands for the
-    averaging of the phase filter, which has no window of its own.
+    The window's area over that of a resolution cell in the middle of the scene. It represents the
+    averaging of the phase filter, which has no fixed window.
     """
     radar, scene, imaging, interferogram = (
         swept_section(study, sweep, name) for name in ("radar", "scene", "imaging", "interferogram")
