@@ -1,0 +1,550 @@
+"""What kind of height each cell has: known, in shadow, laid over, or off by whole cycles.
+
+From the data alone; three signs tell what a standard deviation does not.
+
+* **Power.** Ground in shadow returns nothing but sidelobes of its surroundings.
+* **Geometry.** What stands before a shadow of length d at the distance y is about ``H d / (y + d)``
+  high, H the antenna's height: if the height there is half a cycle less, it has lost one. What
+  known heights hide from an antenna is in shadow.
+* **Split band.** The outer thirds of the band see phases in the ratio of their frequencies. Their
+  difference, with the absolute phase taken away, is whole cycles times that ratio.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar.processing import uncertainty
+from vinsar.radar import aperture
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    Flags = NDArray[np.bool_]
+    Floats = NDArray[np.floating]
+    Complexes = NDArray[np.complexfloating]
+
+CLASSES = ("valid", "shadow", "layover", "uncertain_cycle", "incoherent", "outside")
+"""Classes of a cell, by their number."""
+
+VALID, SHADOW, LAYOVER, UNCERTAIN_CYCLE, INCOHERENT, OUTSIDE = range(len(CLASSES))
+
+# Coherent power of a shadow against its surroundings, in two windows of so many looks: a square,
+# and one as wide as the narrowest shadow that is told. Speckle alone does so once in 1e5.
+_SHADOW = 10 ** (-6 / 10)
+_SHADOW_LOOKS = 15.0
+_ELONGATION = 3
+
+# A shadow ends where the power of a small window is nearly that of lit ground.
+_EDGE = 10 ** (-1.5 / 10)
+_EDGE_LOOKS = 5.0
+
+# Side of the surroundings, in square roots of resolution cells; their median is lit ground.
+_SURROUNDINGS_LOOKS = 700.0
+_LEAST_BACKGROUND = 0.3
+# Values along the side of the surroundings that go into their median.
+_NODES = 12
+
+# Windows of the split band: wrong by half a cycle at three standard deviations in the first.
+SPLIT_LOOKS = (22.0, 85.0)
+# Cycles from which a contradiction counts in either, and how many standard deviations it takes.
+_SPLIT_CYCLES = (0.5, 0.35)
+_SPLIT_SIGNIFICANT = 3.0
+# Its region grows as far as the contradiction is probable.
+_GROWN_CYCLES, _GROWN_SIGNIFICANT = 0.35, 1.3
+# Cycles that the band must say of what stands before too long a shadow.
+_BEFORE_SHADOW = 0.2
+
+# With a standard deviation of a radian a phase is half a cycle off at three of them.
+_MOST_VARIANCE = 1.0
+
+# Heights this many standard deviations below a line of sight are hidden.
+_HIDDEN = 2.0
+
+_TINY = float(np.finfo(float).tiny)
+
+
+def shadow(product: Complexes, *, resolution: Floats, spacing_m: float) -> Flags:
+    """Return which pixels are dark against their surroundings.
+
+    Windows whose coherent power is 6 dB down, without the lit pixels at their edges. The coherent
+    power is that of the interferogram's mean, to which thermal noise adds little.
+
+    Parameters
+    ----------
+    product
+        Interferogram (y, x), unfiltered.
+    resolution
+        Resolution in x and y (2, y, x), m.
+    spacing_m
+        Spacing of the pixels, m.
+
+    Returns
+    -------
+    ndarray of bool, shape (y, x)
+        True in shadow, or where nothing scatters.
+    """
+    from scipy.ndimage import binary_propagation
+
+    def side(looks: float) -> int:
+        return uncertainty.window(looks, resolution, spacing_m)
+
+    narrow = _SHADOW_LOOKS / _ELONGATION
+    shapes = [
+        (side(_SHADOW_LOOKS), side(_SHADOW_LOOKS)),
+        (side(narrow * _ELONGATION**2), side(narrow)),
+    ]
+    powers = [np.abs(uncertainty.mean(product, shape)) for shape in shapes]
+    usual = np.maximum(
+        _surroundings(powers[0], side(_SURROUNDINGS_LOOKS)),
+        max(_LEAST_BACKGROUND * float(np.median(powers[0])), _TINY),
+    )
+    dark = np.zeros(product.shape, bool)
+    for power, shape in zip(powers, shapes, strict=True):
+        dark |= grow(power < _SHADOW * usual, shape)
+    edge = side(_EDGE_LOOKS)
+    lit = np.abs(uncertainty.mean(product, edge)) > _EDGE * usual
+    return np.asarray(~binary_propagation(~dark, mask=~dark | lit))
+
+
+def _surroundings(values: Floats, window_px: int) -> Floats:
+    """Return the median of a square window around each pixel, from a few of its values."""
+    from scipy.ndimage import map_coordinates, median_filter
+
+    step = max(1, window_px // _NODES)
+    few = median_filter(values[::step, ::step], 2 * (window_px // step // 2) + 1, mode="reflect")
+    return np.asarray(
+        map_coordinates(few, np.indices(values.shape) / step, order=1, mode="nearest")
+    )
+
+
+def grow(mask: Flags, shape: int | tuple[int, int]) -> Flags:
+    """Return a mask grown by a window around each of its cells, of sides odd in number."""
+    from scipy.ndimage import maximum_filter
+
+    return np.asarray(maximum_filter(mask.view(np.int8), shape, mode="constant").view(bool))
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Cycles that the phase lacks according to the band.
+
+    Attributes
+    ----------
+    missing
+        Cycles (y, x), positive where the height is to be higher.
+    std
+        Standard deviation (y, x).
+    """
+
+    missing: Floats
+    std: Floats
+
+
+def split_band(
+    images: Complexes,
+    phase: Floats,
+    antennas: tuple[aperture.Aperture, aperture.Aperture],
+    *,
+    x: Floats,
+    y: Floats,
+    wavelength_m: float,
+    resolution: Floats,
+    relative_bandwidth: float,
+    rising: bool,
+) -> list[Cycles]:
+    """Return the cycles that the outer thirds of the band say the phase lacks.
+
+    Parameters
+    ----------
+    images
+        The two images (2, y, x), focused on the ground plane.
+    phase
+        Phase of the interferogram with all its cycles, without that of the ground plane (y, x),
+        rad.
+    antennas
+        The two apertures.
+    x, y
+        Axes, m.
+    wavelength_m
+        Wavelength of the carrier, m.
+    resolution
+        Resolution in x and y (2, y, x), m. Pixels in y must be finer.
+    relative_bandwidth
+        Bandwidth over the carrier.
+    rising
+        Whether the phase rises with the height; with the upper antenna on top it falls (Eq. 1).
+
+    Returns
+    -------
+    list of Cycles
+        One for each window of `SPLIT_LOOKS`. No cycles of infinite standard deviation if the
+        pixels are too coarse to hold the band.
+    """
+    from scipy.ndimage import uniform_filter
+
+    spacing = float(y[1] - y[0])
+    if spacing >= float(resolution[1].min()):
+        none = Cycles(np.zeros(phase.shape), np.full(phase.shape, np.inf))
+        return [none for _ in SPLIT_LOOKS]
+    shares = np.array([-1.0, 1.0]) * relative_bandwidth / 3
+    parts = []
+    for image, part in zip(images, antennas, strict=True):
+        # In y a pixel turns by the carrier's path; without that the band lies around 0.
+        carrier = np.exp(-2j * np.pi / wavelength_m * aperture.path(part, x[None, :], y[:, None]))
+        parts.append(_outer_thirds(image * carrier, spacing, resolution[1].mean(axis=0), carrier))
+    result = []
+    for looks in SPLIT_LOOKS:
+        side = uncertainty.window(looks, resolution, spacing)
+        cells = (side * spacing) ** 2 / (3 * resolution[0] * resolution[1])
+        covered = uniform_filter(np.ones(phase.shape), side, mode="constant")
+        sums, variance = [], np.zeros(phase.shape)
+        for lower, upper, share in zip(*parts, shares, strict=True):
+            turned = lower * np.conj(upper) * np.exp(-1j * phase * (1 + share))
+            total, *powers = (
+                _total(values, side) for values in (turned, np.abs(lower) ** 2, np.abs(upper) ** 2)
+            )
+            coherence = np.abs(total) / np.sqrt(np.maximum(powers[0] * powers[1], _TINY))
+            coherence = np.clip(coherence, 0.02, 0.9999)
+            variance += (1 - coherence**2) / (2 * coherence**2 * np.maximum(cells * covered, 1))
+            sums.append(total)
+        turn = 2 * np.pi * float(shares[1] - shares[0])
+        lacking = np.angle(sums[1] * np.conj(sums[0])) / turn
+        result.append(Cycles(lacking if rising else -lacking, np.sqrt(variance) / turn))
+    return result
+
+
+def _outer_thirds(
+    image: Complexes, spacing_m: float, resolution_m: Floats, carrier: Complexes
+) -> list[Complexes]:
+    """Return an image's parts from the lower and from the upper third of its band."""
+    from scipy import fft
+
+    rows = image.shape[0]
+    # Room for the response of a third, so that the far edge does not reach the near one.
+    padded = fft.next_fast_len(rows + round(6 * float(resolution_m.max()) / spacing_m))
+    spectrum = fft.fft(image, padded, axis=0)
+    place = fft.fftfreq(padded, spacing_m)[:, None] * resolution_m
+    return [
+        fft.ifft(spectrum * ((sign * place > 1 / 6) & (sign * place <= 0.51)), axis=0)[:rows]
+        * np.conj(carrier)
+        for sign in (-1, 1)
+    ]
+
+
+def _total(values: NDArray[Any], side: int) -> NDArray[Any]:
+    from scipy.ndimage import uniform_filter
+
+    if np.iscomplexobj(values):
+        return np.asarray(
+            uniform_filter(values.real, side, mode="constant")
+            + 1j * uniform_filter(values.imag, side, mode="constant")
+        )
+    return np.asarray(uniform_filter(values, side, mode="constant"))
+
+
+@dataclass(frozen=True)
+class Fan:
+    """Lines of sight over a grid, seen from above: nearest cells along rays.
+
+    Attributes
+    ----------
+    antenna
+        Where they start (3,), m.
+    y
+        Axis of the grid, m.
+    columns
+        Column of each ray in each row (row, ray).
+    crossed
+        Whether the ray crosses the grid in that row (row, ray).
+    rays
+        Ray through each cell (row, column).
+    """
+
+    antenna: Floats
+    y: Floats
+    columns: NDArray[np.integer]
+    crossed: Flags
+    rays: NDArray[np.integer]
+
+    @classmethod
+    def over(cls, antenna: Floats, x: Floats, y: Floats) -> Fan:
+        """Return the fan of an antenna over a grid; two rays a cell at the far edge.
+
+        Raises
+        ------
+        ValueError
+            If the antenna is not before the grid.
+        """
+        ahead = y - antenna[1]
+        if ahead[0] <= 0:
+            raise ValueError(
+                f"the antenna at y = {antenna[1]:.2f} m is not before the image, which begins at "
+                f"y = {y[0]:.2f} m"
+            )
+        spacing = float(x[1] - x[0])
+        ends = [(x[side] - antenna[0]) / ahead[row] for side in (0, -1) for row in (0, -1)]
+        left, right = min(ends), max(ends)
+        count = int(np.ceil(2 * (right - left) * ahead[-1] / spacing)) + 2
+        slope = np.linspace(left, right, count)
+        column = (antenna[0] + slope * ahead[:, None] - x[0]) / spacing
+        nearest = np.rint(column).astype(int)
+        ray = ((x - antenna[0]) / ahead[:, None] - left) / (slope[1] - slope[0])
+        return cls(
+            antenna=antenna,
+            y=y,
+            columns=np.clip(nearest, 0, x.size - 1),
+            crossed=(nearest >= 0) & (nearest < x.size),
+            rays=np.clip(np.rint(ray).astype(int), 0, count - 1),
+        )
+
+    def along(self, values: NDArray[Any], outside: float | bool) -> NDArray[Any]:
+        """Return values of the grid by ray (row, ray)."""
+        found = values[np.arange(self.y.size)[:, None], self.columns]
+        return np.where(self.crossed, found, outside)
+
+    def back(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values by ray on the grid (row, column)."""
+        return np.asarray(values[np.arange(self.y.size)[:, None], self.rays])
+
+    def line_of_sight(self, height: Floats, known: Flags) -> Floats:
+        """Return the height up to which known heights before it hide each cell, m."""
+        ahead = (self.y - self.antenna[1])[:, None]
+        along = self.along(np.where(known, height, -np.inf), -np.inf)
+        horizon = np.maximum.accumulate((along - self.antenna[2]) / ahead, axis=0)
+        before = np.vstack([np.full((1, horizon.shape[1]), -np.inf), horizon[:-1]])
+        return np.asarray(self.antenna[2] + self.back(before * ahead))
+
+    def too_low(self, dark: Flags, height: Floats, ambiguity: Floats, *, reach_m: float) -> Flags:
+        """Return what stands before a shadow and is half a cycle too low for its length.
+
+        Parameters
+        ----------
+        dark
+            Shadow (y, x).
+        height
+            Heights (y, x), m.
+        ambiguity
+            Height of ambiguity (y, x), m.
+        reach_m
+            How far before its shadow something stands, and how long a shadow must be at least, m.
+
+        Returns
+        -------
+        ndarray of bool, shape (y, x)
+            Cells before such shadows.
+        """
+        spacing = float(self.y[1] - self.y[0])
+        reach = max(1, round(reach_m / spacing))
+        away, top = self.y - self.antenna[1], float(self.antenna[2])
+        shade = np.asarray(self.along(dark, False), np.int8)
+        heights = np.asarray(self.along(height, np.nan), float)
+        cycle = np.asarray(self.along(ambiguity, np.inf), float)
+        ground = float(np.nanmedian(height)) if np.isfinite(height).any() else 0.0
+        found = np.zeros(shade.shape, bool)
+        edge = np.diff(np.pad(shade, ((1, 1), (0, 0))), axis=0)
+        for ray in range(shade.shape[1]):
+            begins, ends = np.nonzero(edge[:, ray] == 1)[0], np.nonzero(edge[:, ray] == -1)[0]
+            for begin, end in zip(begins, ends, strict=True):
+                if end - begin < reach or begin == 0:
+                    continue
+                behind = heights[end : end + reach, ray]
+                level = np.median(behind) if np.isfinite(behind).all() and behind.size else ground
+                length = (end - begin) * spacing
+                needed = level + (top - level) * length / (away[begin] + length)
+                before = slice(max(0, begin - reach), begin)
+                here = heights[before, ray]
+                if np.isfinite(here).any() and (
+                    needed - np.nanmax(here) > cycle[begin - 1, ray] / 2
+                ):
+                    found[before, ray] = True
+        return np.asarray(self.back(found), bool)
+
+
+def uncertain_cycles(
+    cycles: Sequence[Cycles], dark: Flags, too_low: Flags, *, window_px: int
+) -> Flags:
+    """Return where the phase contradicts the band, or stands too low before its shadow.
+
+    Parameters
+    ----------
+    cycles
+        What the band says, by window (`split_band`), on the grid of the heights.
+    dark
+        Cells in shadow, which say nothing.
+    too_low
+        Cells before a shadow that is too long for them.
+    window_px
+        Side of the band's first window, pixels.
+
+    Returns
+    -------
+    ndarray of bool, shape (y, x)
+        True where the number of cycles is not certain.
+    """
+    from scipy.ndimage import binary_propagation
+
+    found = np.zeros(dark.shape, bool)
+    near = 2 * window_px - 1
+    # Backwards from the shadow, as deep as what stands there may be.
+    deep = 4 * window_px + 1, 2 * (window_px // 4) + 1
+    for sign in (-1, 1):
+        first = sign * cycles[0].missing
+        probable = ~dark & (first > np.maximum(_GROWN_CYCLES, _GROWN_SIGNIFICANT * cycles[0].std))
+        certain = np.zeros(dark.shape, bool)
+        for part, least in zip(cycles, _SPLIT_CYCLES, strict=True):
+            certain |= sign * part.missing > np.maximum(least, _SPLIT_SIGNIFICANT * part.std)
+        certain &= ~dark & (first > _GROWN_CYCLES)
+        found |= binary_propagation(certain, mask=certain | (probable & grow(certain, near)))
+        if sign > 0:
+            likely = ~dark & (first > _BEFORE_SHADOW)
+            seeds = too_low & likely
+            found |= binary_propagation(seeds, mask=likely & grow(too_low, deep))
+    return np.asarray(grow(found, 2 * (window_px // 5) + 1) & ~dark)
+
+
+def islands(valid: Flags, reference: Flags, cycles: Cycles, *, window_px: int) -> Flags:
+    """Return valid cells that no valid cells connect with the height reference.
+
+    Where the band confirms their cycle at two standard deviations they stay.
+
+    Parameters
+    ----------
+    valid
+        Cells (y, x) whose height is otherwise known.
+    reference
+        Cells of the height reference.
+    cycles
+        What the band says of each cell.
+    window_px
+        Side of the band's window, pixels.
+
+    Returns
+    -------
+    ndarray of bool, shape (y, x)
+        True on islands.
+    """
+    from scipy.ndimage import label
+
+    areas, count = label(valid, np.ones((3, 3)))
+    held = np.unique(areas[reference & valid])
+    result = np.zeros(valid.shape, bool)
+    for number in range(1, count + 1):
+        if number in held:
+            continue
+        area = areas == number
+        windows = max(1.0, area.sum() / window_px**2)
+        off = abs(float(cycles.missing[area].mean()))
+        error = float(cycles.std[area].mean()) / np.sqrt(windows)
+        if not off + 2 * error < 0.5:
+            result |= area
+    return result
+
+
+def layover(true_y: Floats, slack_m: Floats) -> Flags:
+    """Return pixels that come out before the pixel nearer to the radar: terrain that folds over.
+
+    Parameters
+    ----------
+    true_y
+        Where the pixels belong (y, x), m; NaN where that is not known.
+    slack_m
+        By how much noise may put them out of order (y, x), m.
+
+    Returns
+    -------
+    ndarray of bool, shape (y, x)
+        True for both pixels of each such pair.
+    """
+    back = np.diff(true_y, axis=0) < -np.maximum(slack_m[1:], slack_m[:-1])
+    result = np.zeros(true_y.shape, bool)
+    result[1:] |= back
+    result[:-1] |= back
+    return result
+
+
+def classify(
+    height: Floats,
+    std: Floats,
+    *,
+    dark: Flags,
+    folded: Flags,
+    variance: Floats,
+    cycles: Sequence[Cycles],
+    ambiguity: Floats,
+    reference: Flags,
+    antennas: Sequence[Floats],
+    x: Floats,
+    y: Floats,
+    window_px: int,
+) -> NDArray[np.int8]:
+    """Return the class of each cell of a DEM.
+
+    All arrays are on the grid of the DEM (y, x).
+
+    Parameters
+    ----------
+    height, std
+        Heights and their standard deviation, m; NaN where there is none.
+    dark
+        Cells of pixels in `shadow`.
+    folded
+        Cells of pixels in `layover`.
+    variance
+        Variance of the phase by noise alone, rad^2.
+    cycles
+        What the band says (`split_band`).
+    ambiguity
+        Height of ambiguity, m.
+    reference
+        Cells of the height reference.
+    antennas
+        Centres of the apertures' lines (3,), m.
+    x, y
+        Axes, m.
+    window_px
+        Side of the band's first window, pixels.
+
+    Returns
+    -------
+    ndarray of int8, shape (y, x)
+        Index into `CLASSES`.
+    """
+    fans = [Fan.over(antenna, x, y) for antenna in antennas]
+    lowest = min(fans, key=lambda fan: float(fan.antenna[2]))
+    outside = ~np.isfinite(height)
+    reach = max(1, window_px // 2) * float(y[1] - y[0])
+    low = lowest.too_low(dark, height, ambiguity, reach_m=reach)
+    uncertain = uncertain_cycles(cycles, dark, low, window_px=window_px)
+    incoherent = ~(variance <= _MOST_VARIANCE)
+    known = ~(outside | dark | uncertain | incoherent | folded)
+    hidden = np.zeros(height.shape, bool)
+    for fan in fans:
+        hidden |= fan.line_of_sight(height, known) > height + _HIDDEN * std
+    known &= ~hidden
+    alone = islands(known, reference, cycles[0], window_px=window_px)
+    result = np.full(height.shape, VALID, np.int8)
+    result[incoherent] = INCOHERENT
+    result[uncertain | alone] = UNCERTAIN_CYCLE
+    result[folded] = LAYOVER
+    result[dark | hidden] = SHADOW
+    result[outside] = OUTSIDE
+    return result
+
+
+def coded(code: Callable[[Floats], Floats], mask: Flags) -> Flags:
+    """Return a mask of pixels on the grid of the DEM; cells without a pixel are in it.
+
+    Parameters
+    ----------
+    code
+        From the image's pixels to the DEM's cells (`height.code_dem`).
+    mask
+        Pixels (y, x).
+    """
+    return np.asarray(~(code(mask.astype(float)) < 0.5))

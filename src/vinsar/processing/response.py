@@ -1,0 +1,278 @@
+"""What a filter of the interferogram does to signal and to noise.
+
+Each filter is linear, or nearly so once its weights are known (Goldstein's follow from the data).
+What it leaves of the noise follows from its weights and the noise's correlation
+(`vinsar.radar.decorrelation`), and what it takes from the signal from applying it again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from vinsar.radar.decorrelation import Decorrelation
+
+    Floats = NDArray[np.floating]
+    Complexes = NDArray[np.complexfloating]
+
+# Noise changes over windows of metres: its gain is computed at nodes so many pixels apart.
+_NODE_PX = 6
+
+# A Gaussian's weights are cut where they are below 1 %.
+_REACH = 3
+
+
+class Response(Protocol):
+    """A filter with its weights."""
+
+    @property
+    def follows_amplitude(self) -> bool:
+        """Whether what comes out is as large as the looks that went in, and as sure."""
+        ...
+
+    def apply(self, values: Complexes) -> Complexes:
+        """Return values (y, x) filtered with these weights."""
+        ...
+
+    def gain(self, noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> Floats:
+        """Return the noise that is left over the noise that went in.
+
+        Parameters
+        ----------
+        noise
+            What decorrelates each pixel (y, x).
+        shape
+            Shape of the image.
+        spacing_m
+            Spacing of its pixels, m.
+
+        Returns
+        -------
+        ndarray, shape (y, x)
+            Variance across the mean phase, 1 for no filter; one over the effective looks.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Average:
+    """A weighted average, the same along x and along y.
+
+    Attributes
+    ----------
+    weights
+        Weights along one axis (2 n + 1,), of sum 1.
+    """
+
+    weights: Floats
+    follows_amplitude: bool = True
+
+    def apply(self, values: Complexes) -> Complexes:
+        """Return values (y, x) averaged; at the edges, over what there is."""
+        if self.weights.size == 1:
+            return values
+        total = _separable(values, self.weights)
+        covered = _separable(np.ones(values.shape), self.weights)
+        return np.asarray(total / covered)
+
+    def gain(self, noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> Floats:
+        """Return the noise that is left over the noise that went in, as in `Response`.
+
+        Across the fringes the average sees ``w(d) exp(-2 pi i f d)``: with X the filtered noise,
+        the variance across the phase is ``(E|X|^2 - Re E X^2) / 2``.
+        """
+        if self.weights.size == 1:
+            return np.ones(shape)
+        rows, columns = (_nodes(size) for size in shape)
+        part = noise.at(np.ix_(rows, columns))
+        count = self.weights.size
+        place = (np.arange(count) - (count - 1) / 2) * spacing_m
+        own, cross = np.ones(part.coherence.size), np.ones(part.coherence.size)
+        for axis in (0, 1):
+            fringes = 2 * np.pi * part.fringes[axis][:, None]
+            alike, crossed = np.zeros(own.size), np.zeros(own.size)
+            for weight, here in zip(self.weights, place, strict=True):
+                first, second = part.correlations(axis, here - place)
+                alike += weight * (first * np.cos(fringes * (here - place))) @ self.weights
+                crossed += weight * (second * np.cos(fringes * (here + place))) @ self.weights
+            own, cross = own * alike, cross * crossed
+        found = part.combine(own, cross).reshape(rows.size, columns.size)
+        return _interpolate(found, rows, columns, shape)
+
+
+class Goldstein:
+    """Goldstein's filter with the weights that it found.
+
+    Patches overlap by half here, which is enough for what changes from patch to patch.
+
+    Parameters
+    ----------
+    interferogram
+        What was filtered (y, x).
+    alpha, patch_px
+        As in `filtering.goldstein`.
+    """
+
+    follows_amplitude = False
+
+    def __init__(self, interferogram: Complexes, *, alpha: float, patch_px: int) -> None:
+        from scipy import fft
+
+        from vinsar.kernels import patches as kernel
+
+        self.side = patch_px
+        self.step = next(n for n in range(patch_px // 4, 0, -1) if patch_px % n == 0)
+        self.shape = interferogram.shape
+        lead = self.side - self.step
+        self.lead = lead
+        self.down, self.across = (-(-(size + lead) // self.step) for size in self.shape)
+        spectra = fft.fft2(self._patches(interferogram))
+        self.weights = np.empty(spectra.shape, np.float32)
+        kernel.smooth(spectra, self.weights)
+        np.power(self.weights, np.float32(alpha), out=self.weights)
+        profile = np.sin(np.pi * (np.arange(self.side) + 0.5) / self.side) ** 2
+        self.taper = profile.astype(np.float32)
+
+    def _patches(self, values: Complexes) -> Complexes:
+        size = [self.lead + n * self.step + self.side for n in (self.down, self.across)]
+        padded = np.zeros(size, np.complex64)
+        padded[self.lead : self.lead + self.shape[0], self.lead : self.lead + self.shape[1]] = (
+            values
+        )
+        windows = np.lib.stride_tricks.sliding_window_view(padded, (self.side, self.side))
+        return np.asarray(
+            windows[: self.down * self.step : self.step, : self.across * self.step : self.step]
+        )
+
+    def _add_up(self, patches: Complexes) -> Complexes:
+        from vinsar.kernels import patches as kernel
+
+        size = [self.lead + n * self.step + self.side for n in (self.down, self.across)]
+        total = np.zeros(size, np.complex64)
+        kernel.overlap_add(
+            np.ascontiguousarray(patches, np.complex64), self.taper, self.step, total
+        )
+        inside = total[self.lead : self.lead + self.shape[0], self.lead : self.lead + self.shape[1]]
+        return np.asarray(inside / (self.side / (2 * self.step)) ** 2)
+
+    def apply(self, values: Complexes) -> Complexes:
+        """Return values (y, x) filtered with these weights."""
+        from scipy import fft
+
+        return self._add_up(fft.ifft2(fft.fft2(self._patches(values)) * self.weights))
+
+    def gain(self, noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> Floats:
+        """Return the noise that is left over the noise that went in, as in `Response`.
+
+        The sum over the patch's frequencies of its squared weights times the noise's spectrum.
+        """
+        centers = [
+            np.clip(np.arange(n) * self.step + self.side // 2 - self.lead, 0, size - 1)
+            for n, size in zip((self.down, self.across), shape, strict=True)
+        ]
+        part = noise.at(np.ix_(*centers))
+        lag = np.fft.fftfreq(self.side) * self.side
+        overlap = 1 - np.abs(lag) / self.side
+        own, cross = (
+            [np.fft.fft(values * overlap, axis=1).real / self.side for values in pair]
+            for pair in zip(
+                *(part.correlations(axis, lag * spacing_m) for axis in (1, 0)), strict=True
+            )
+        )
+        power = self.weights.reshape(-1, self.side, self.side) ** 2
+        sums = [np.einsum("pij,pi,pj->p", power, *pair, optimize=True) for pair in (own, cross)]
+        found = part.combine(*sums).reshape(self.down, self.across, 1, 1)
+        spread = np.broadcast_to(found, (self.down, self.across, self.side, self.side))
+        return np.asarray(self._add_up(spread.astype(np.complex64)).real.astype(float))
+
+
+def of(
+    interferogram: Complexes,
+    *,
+    method: str,
+    goldstein_alpha: float,
+    goldstein_patch_px: int,
+    boxcar_window_px: int,
+) -> Response:
+    """Return the response of a filter that was applied to an interferogram.
+
+    Parameters
+    ----------
+    interferogram
+        What was filtered (y, x).
+    method
+        The filter, as in `filtering.apply`.
+    goldstein_alpha, goldstein_patch_px, boxcar_window_px
+        Its options, as there.
+
+    Raises
+    ------
+    ValueError
+        If there is no such filter.
+    """
+    if method == "goldstein":
+        return Goldstein(interferogram, alpha=goldstein_alpha, patch_px=goldstein_patch_px)
+    if method == "boxcar":
+        return Average(np.full(boxcar_window_px, 1 / boxcar_window_px))
+    if method == "none":
+        return Average(np.ones(1))
+    raise ValueError(f"the response of a filter '{method}' is not known")
+
+
+def gaussian_weights(std_px: float) -> Floats:
+    """Return the weights of `filtering.gaussian` along one axis, of sum 1."""
+    reach = int(np.ceil(_REACH * std_px))
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / std_px) ** 2)
+    return np.asarray(weights / weights.sum())
+
+
+def _separable(values: NDArray[Any], weights: Floats) -> NDArray[Any]:
+    from scipy.ndimage import convolve1d
+
+    def both(part: Floats) -> Floats:
+        along = convolve1d(part, weights, axis=0, mode="constant")
+        return np.asarray(convolve1d(along, weights, axis=1, mode="constant"))
+
+    if np.iscomplexobj(values):
+        return np.asarray(both(values.real) + 1j * both(values.imag))
+    return both(np.asarray(values, float))
+
+
+def _nodes(size: int) -> NDArray[np.integer]:
+    return np.unique(np.append(np.arange(0, size, _NODE_PX), size - 1))
+
+
+def _interpolate(
+    values: Floats,
+    rows: NDArray[np.integer],
+    columns: NDArray[np.integer],
+    shape: tuple[int, int],
+) -> Floats:
+    across = np.array([np.interp(np.arange(shape[1]), columns, line) for line in values])
+    return np.array([np.interp(np.arange(shape[0]), rows, line) for line in across.T]).T
+
+
+def rectangle_gain(noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> float:
+    """Return the noise that the mean over a rectangle leaves over that of a pixel.
+
+    Parameters
+    ----------
+    noise
+        What decorrelates the pixel in its middle; its fringes do not count.
+    shape
+        Rows and columns.
+    spacing_m
+        Spacing of the pixels, m.
+    """
+    own, cross = 1.0, 1.0
+    for axis, count in ((1, shape[0]), (0, shape[1])):
+        lag = np.arange(1 - count, count)
+        weight = (count - np.abs(lag)) / count**2
+        first, second = noise.correlations(axis, lag * spacing_m)
+        own, cross = own * float((first @ weight)[0]), cross * float((second @ weight)[0])
+    return float(noise.combine(np.array([own]), np.array([cross]))[0])

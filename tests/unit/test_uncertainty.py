@@ -1,0 +1,115 @@
+"""The variance of a phase, against drawn pairs of images whose phase is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vinsar.processing import response, uncertainty
+
+SPACING = 1.0
+NONE = {"method": "none", "goldstein_alpha": 0.8, "goldstein_patch_px": 16, "boxcar_window_px": 5}
+
+
+def pair(rng, shape, coherence, gain=1.0, phase=0.0):
+    """Images of white speckle: a pixel is a resolution cell."""
+    first, other = rng.normal(size=(2, *shape, 2)).view(complex)[..., 0] / np.sqrt(2)
+    second = coherence * first + np.sqrt(1 - coherence**2) * other
+    return np.stack([first, gain * second * np.exp(-1j * phase)])
+
+
+def estimate(images, phase=0.0):
+    shape = images.shape[1:]
+    return uncertainty.estimate(
+        images,
+        np.broadcast_to(np.asarray(phase, float), shape),
+        np.zeros(shape),
+        resolution=np.full((2, *shape), SPACING),
+        spacing_m=SPACING,
+        relative_bandwidth=0.1,
+    )
+
+
+@pytest.mark.parametrize("coherence", [0.3, 0.41, 0.5, 0.7, 0.9, 0.98])
+def test_coherence_is_not_biased(coherence):
+    images = pair(np.random.default_rng(4), (200, 200), coherence, gain=3.0, phase=1.0)
+    found = estimate(images).decorrelation.coherence
+    # 40 000 pixels in some 800 windows: a standard error of (1 - gamma^2) / sqrt(2 * 40 000).
+    assert np.median(found) == pytest.approx(coherence, abs=0.02)
+
+
+@pytest.mark.parametrize("coherence", [0.8, 0.95])
+def test_intervals_of_a_single_look_hold_what_they_say(coherence):
+    images = pair(np.random.default_rng(5), (150, 150), coherence)
+    product = images[0] * np.conj(images[1])
+    variance = uncertainty.noise_variance(
+        estimate(images), response.of(product, **NONE), product, product, spacing_m=SPACING
+    )
+    error = np.abs(np.angle(product)) / np.sqrt(variance)
+    # Binomial: 3 sqrt(0.683 * 0.317 / 22 500) = 0.9 %; the von Mises distribution of a dark pixel
+    # is not normal, and the noise is estimated: two per cent more.
+    assert np.mean(error < 1) == pytest.approx(0.683, abs=0.03)
+    assert np.mean(error < 2) == pytest.approx(0.954, abs=0.02)
+
+
+def test_a_pixel_without_signal_has_no_phase():
+    images = np.zeros((2, 12, 12), complex)
+    product = images[0]
+    variance = uncertainty.noise_variance(
+        estimate(images), response.of(product, **NONE), product, product, spacing_m=SPACING
+    )
+    np.testing.assert_allclose(variance, np.pi**2 / 3)
+
+
+def test_smoothing_of_a_ramp_is_nothing_and_of_a_parabola_its_curvature():
+    line = np.arange(80.0)
+    filter_ = response.Average(np.full(5, 0.2))
+    resolution = np.full((2, 80, 80), 1e-3)
+    inner = np.s_[25:-25, 25:-25]
+
+    def smoothed(phase):
+        product = np.exp(1j * np.broadcast_to(phase, (80, 80)))
+        found = uncertainty.smoothing(filter_, product, resolution=resolution, spacing_m=1.0)
+        return found[inner]
+
+    np.testing.assert_allclose(smoothed(0.02 * line), 0, atol=1e-6)
+    curvature = 1e-3
+    # Five pixels have a second moment of (25 - 1) / 12, half of it times the curvature; chords of
+    # the circle, whose means are not those of the angle, are of second order in 0.06 rad.
+    expected = curvature * (25 - 1) / 12 / 2
+    np.testing.assert_allclose(smoothed(curvature / 2 * (line - 40) ** 2), expected, rtol=0.02)
+
+
+def test_the_reference_errs_as_its_looks_do_and_as_its_ground_does():
+    rng = np.random.default_rng(6)
+    shape, coherence = (40, 40), 0.8
+    where = [(slice(5, 11), slice(5, 11)), (slice(5, 11), slice(29, 35))]
+    level = np.zeros(shape)
+    told, found = [], []
+    for _ in range(150):
+        images = pair(rng, shape, coherence)
+        product = images[0] * np.conj(images[1])
+        noise = estimate(images)
+        told.append(uncertainty.reference_variance(noise, product, where, level, spacing_m=SPACING))
+        found.append(np.mean([np.angle(product[part].mean()) for part in where]))
+    # 72 looks; 150 draws have their standard deviation to 3 / sqrt(300) = 17 %. What chance makes
+    # of uneven ground is told on top of it.
+    assert np.std(found) == pytest.approx(np.sqrt(0.36 / 2 / 0.64 / 72), rel=0.17)
+    assert 0.83 * np.std(found) < np.sqrt(np.mean(told)) < 1.6 * np.std(found)
+    # A step of a radian through both: no better known than half of it over the root of two.
+    uneven = images * np.exp(1j * (np.arange(40)[:, None] >= 8) * np.array([0, -1])[:, None, None])
+    product = uneven[0] * np.conj(uneven[1])
+    rough = uncertainty.reference_variance(
+        estimate(uneven), product, where, level, spacing_m=SPACING
+    )
+    assert rough > 4 * np.mean(told)
+
+
+def test_windows_hold_the_looks_that_they_are_asked_for():
+    resolution = np.stack([np.full((3, 3), 0.18), np.full((3, 3), 0.075)])
+    for looks in (9, 42, 85):
+        side = uncertainty.window(looks, resolution, 0.01)
+        assert side % 2 == 1
+        # An odd number of pixels is within one of what is asked for.
+        assert side * 0.01 == pytest.approx(np.sqrt(looks * 0.18 * 0.075), abs=0.01)
+    assert uncertainty.window(1, resolution, 5.0) == 1
