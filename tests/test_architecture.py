@@ -77,9 +77,11 @@ def test_kernels_are_looked_at():
 
 @pytest.mark.parametrize("name", [name for name in MODULES if name.startswith(f"{PROCESSING}.")])
 def test_the_processing_never_reaches_the_true_scene(name):
-    reached = reached_from(name)
-    assert "vinsar.foundations.variables" in reached, "or this test follows no imports"
-    assert not [other for other in reached if other.startswith(TRUTH)]
+    assert not [other for other in reached_from(name) if other.startswith(TRUTH)]
+
+
+def test_imports_are_followed():
+    assert "vinsar.foundations.variables" in reached_from(f"{PROCESSING}.height")
 
 
 def test_the_library_knows_nothing_of_the_workflow():
