@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vinsar.prediction import design
-from vinsar.processing import focusing
+from vinsar.processing import filtering, focusing
 from vinsar.radar import aperture, trajectory, waveform
 from vinsar.simulation import echo
 from vinsar.study import pipeline, validation
@@ -61,13 +61,97 @@ def run(**changes):
     return design.Sheet(study), pipeline.run(study, only="accuracy")
 
 
-@pytest.mark.parametrize("changes", [{}, {"echo": {"snr_db": 10.0}}])
-def test_the_predicted_height_noise_is_measured_within_a_factor_of_two_and_a_half(changes):
-    sheet, products = run(**changes)
-    accuracy = products["accuracy"].sel(region="visible_ground")
-    ratio = 1.4826 * float(accuracy["mad"]) / sheet.scene_height_std()
-    # The phase filter averages over more than the window whose looks the prediction counts.
-    assert 1 / 2.5 < ratio < 2.5
+@pytest.fixture(scope="module", params=[None, 10.0, 0.0], ids=lambda snr: f"{snr} dB")
+def level_ground(request):
+    """Interferogram of level ground as wide and deep as the paper's scene, and its sheet."""
+    raw = validation.load(CONFIG / "paper.yaml").model_dump(mode="json")
+    changes = {
+        "variants": {},
+        "sweeps": {},
+        "outputs": {"figures": [], "claims": False},
+        "scene": {"terrain": "flat", "y_min_m": 10.0, "y_max_m": 13.0, "facet_size_m": 0.025},
+        "radar": {"frequency_count": 241},
+        "imaging": {"grid_spacing_m": 0.025, "y_max_m": 13.0},
+        "echo": {"accuracy_db": -85.0, "snr_db": request.param},
+    }
+    study = validation.check(validation.merge(raw, changes))
+    return design.Sheet(study), pipeline.run(study, only="interferogram")
+
+
+def test_level_ground_is_as_coherent_as_predicted(level_ground):
+    sheet, products = level_ground
+    image, y = products["images"]["image"], products["images"]["y"].values
+    # In rows away from the scene's edges, by the sums over 5 m x 1 m, some 300 cells.
+    for middle in (10.8, 12.2):
+        part = image.isel(y=np.abs(y - middle) < 0.5)
+        lower, upper = part.values
+        found = abs(np.vdot(upper, lower)) / (np.linalg.norm(lower) * np.linalg.norm(upper))
+        predicted = float(sheet.coherence(middle))
+        # Three standard errors of (1 - g^2) / sqrt(2 N); the range cells' signal differs by some
+        # per cent, and with it the noise.
+        assert found == pytest.approx(predicted, abs=0.012 + 3 * (1 - predicted**2) / 24)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"goldstein_alpha": 0.5},
+        {"method": "boxcar"},
+        {"method": "boxcar", "boxcar_window_px": 15},
+        {"method": "none"},
+    ],
+    ids=str,
+)
+def test_the_phase_of_level_ground_is_as_noisy_as_predicted(level_ground, options):
+    sheet, products = level_ground
+    filters = sheet.study.filtering.model_copy(update=options)
+    product = filtering.apply(products["interferogram"], **filters.model_dump())
+    y = product["y"].values
+    rows = (y > 10.3) & (y < 12.7)
+    # Level ground has no phase: focusing on it has removed it.
+    measured = np.angle(product["interferogram"].values[rows]).std()
+    study = sheet.study.model_copy(update={"filtering": filters})
+    at = np.linspace(10.3, 12.7, 5)
+    per_radian = sheet.instrument.height_of_ambiguity(0.0, at) / (2 * np.pi)
+    predicted = np.sqrt(np.mean((design.Sheet(study).height_std(at) / per_radian) ** 2))
+    # As of filtered speckle (test_filtering), and Goldstein's looks a little too few: the
+    # prediction is high by up to 40 %, and never low.
+    assert 0.65 < measured / predicted < 1.1
+
+
+@pytest.mark.parametrize("beta", [60.0, 90.0])
+def test_errors_of_both_channels_turn_the_phase_of_level_ground_as_predicted(beta):
+    raw = validation.load(CONFIG / "paper.yaml").model_dump(mode="json")
+    sheet = design.Sheet(validation.check(
+        validation.merge(raw, {"radar": {"baseline_angle_deg": beta}, "variants": {}, "sweeps": {}})
+    ))  # fmt: skip
+    std, count, draws = 8.51e-3, 300, 400
+    x, y = np.array(0.0), np.array(10.6)
+    # Targets across the scene at the range of the pixel: on a circle around the rail.
+    across = np.linspace(-2.5, 2.5, count)
+    targets = np.stack([across, np.sqrt(y**2 - across**2), 0 * across], axis=-1)
+    shifts = std * np.random.default_rng(0).standard_normal((draws, 81))
+    responses = []
+    for rail in sheet.antennas["receiver"].values:
+        path = 2 * np.linalg.norm(targets - rail[:, None], axis=-1)
+        ray = np.array([x, y, 0.0]) - rail
+        own = np.linalg.norm(ray, axis=-1)
+        errors = np.exp(-4j * np.pi / WAVELENGTH * shifts * ray[:, 2] / own)
+        focusing_phase = np.exp(2j * np.pi / WAVELENGTH * (2 * own[:, None] - path))
+        responses.append(errors @ focusing_phase / 81)
+    lower, upper = responses
+    found = np.vdot(upper, lower) / (np.linalg.norm(lower) * np.linalg.norm(upper))
+    errors = std * sheet.phase_per_position(x, y, 2)
+    predicted = sheet.complex_coherence(x, y, errors, common=True)
+    # One range alone: the baseline decorrelates none of it.
+    predicted = predicted / sheet.instrument.geometric_coherence(x, y)
+    # The focused response has sidelobes across the scene, whose targets turn the phase as well.
+    assert abs(found - predicted) < 0.05
+    if beta == 90.0:
+        assert abs(found) > 0.98
+    else:
+        assert np.angle(found) > 0.2
 
 
 def test_position_errors_leave_the_predicted_coherence():

@@ -1,4 +1,4 @@
-"""Errors of the baseline against Eqs. 5 and 12, and the noise of the height."""
+"""Errors of the baseline against Eqs. 5 and 12."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 
 from vinsar.evaluation import baseline_errors
 from vinsar.foundations import variables
-from vinsar.radar import baseline, formulas, geometry, speckle
+from vinsar.radar import baseline, formulas, geometry
 from vinsar.study import validation
 
 BASELINE_M = 0.3
@@ -111,22 +111,3 @@ def test_the_view_is_that_of_the_configuration():
     seen = baseline.view(study.radar, study.scene)
     assert (seen.x_m, seen.y_m, *seen.lower) == (0.0, 13.0, 0.0, 0.0, 2.0)
     assert seen.critical_baseline == pytest.approx(12.21, abs=0.01)
-
-
-@pytest.mark.parametrize(("coherence", "looks"), [(0.98, 16), (0.9, 32), (0.7, 64)])
-def test_the_bound_is_that_of_multilooked_speckle(coherence, looks):
-    rng = np.random.default_rng(0)
-    unit = rng.standard_normal((3, looks, 20_000, 2)) @ np.array([1, 1j])
-    common = np.sqrt(coherence) * unit[0]
-    first, second = (common + np.sqrt(1 - coherence) * part for part in unit[1:])
-    phase = np.angle((first * second.conj()).sum(0))
-    assert phase.std() == pytest.approx(float(speckle.phase_std(coherence, looks)), rel=0.06)
-
-
-def test_the_bound_is_none_for_full_coherence_and_infinite_without():
-    assert float(speckle.phase_std(1.0, 1)) == 0
-    assert float(speckle.phase_std(0.0, 1)) == np.inf
-
-
-def test_coherence_falls_with_noise():
-    np.testing.assert_allclose(speckle.noise_coherence([0.0, 10.0]), [0.5, 10 / 11])

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import spence
 
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
@@ -122,20 +123,24 @@ def test_the_reference_takes_what_is_constant_over_the_image():
 def test_noise_grows_with_what_makes_noise():
     y = np.array([10.0, 16.0])
     quiet = sheet_of().height_std(y)
-    assert (sheet_of(echo={"snr_db": 5.0}).height_std(y) > 1.5 * quiet).all()
-    assert (sheet_of(interferogram={"coherence_window_px": 15}).height_std(y) < 0.6 * quiet).all()
+    assert (sheet_of(echo={"snr_db": 0.0}).height_std(y) > 1.5 * quiet).all()
+    assert (sheet_of(filtering={"goldstein_alpha": 0.4}).height_std(y) > 1.2 * quiet).all()
     assert (sheet_of().height_std(y, 0.5) > 1.2 * quiet).all()
     # A random phase is the worst.
     most = sheet_of().instrument.height_of_ambiguity(0.0, y) / np.sqrt(12)
-    np.testing.assert_allclose(sheet_of().height_std(y, 5.0), most)
+    np.testing.assert_allclose(sheet_of().height_std(y, 5.0), most, rtol=1e-3)
 
 
-def test_the_noise_is_the_cramer_rao_bound_of_the_baseline_s_figures():
-    sheet = sheet_of(echo={"snr_db": 10.0})
-    coherence = 10 / 11 * sheet.instrument.geometric_coherence(0.0, 13.0)
-    phase = np.sqrt((1 - coherence**2) / 2) / coherence
-    bound = sheet.instrument.height_of_ambiguity(0.0, 13.0) / (2 * np.pi) * phase
-    assert sheet.height_std(13.0) == pytest.approx(float(bound))
+def test_without_a_filter_the_noise_is_that_of_a_single_look():
+    sheet = sheet_of(echo={"snr_db": 10.0}, filtering={"method": "none"})
+    # The scene's 5 m fill a third of the unambiguous width, which the noise fills whole.
+    filled = float(sheet.instrument.filled(-2.5, 2.5, 13.0))
+    assert 0.3 < filled < 0.35
+    coherence = float(sheet.instrument.geometric_coherence(0.0, 13.0)) / (1 + filled / 10)
+    angle = np.arcsin(coherence)
+    phase = np.pi**2 / 3 - np.pi * angle + angle**2 - spence(1 - coherence**2) / 2
+    cycle = float(sheet.instrument.height_of_ambiguity(0.0, 13.0))
+    assert sheet.height_std(13.0) == pytest.approx(cycle / (2 * np.pi) * np.sqrt(phase), rel=1e-6)
 
 
 def test_spreading_makes_the_far_edge_noisier():
@@ -145,16 +150,87 @@ def test_spreading_makes_the_far_edge_noisier():
     assert near - far == pytest.approx(40 * np.log10(np.hypot(16, 2) / np.hypot(10, 2)), abs=1e-9)
 
 
-def test_tolerated_errors_meet_the_tolerance():
-    sheet = sheet_of()
-    for axis in range(3):
-        std = sheet.tolerated_scatter(axis)
-        x = np.array([-2.5, 0.0, 2.5])[:, None]
-        slope = sheet.phase_per_position(x, sheet.places, axis).max(axis=0)
-        assert 1.96 * sheet.height_std(sheet.places, std * slope).max() == pytest.approx(0.05)
+def test_tolerated_scatter_leaves_95_percent_within_the_tolerance():
+    sheet = sheet_of(radar={"baseline_angle_deg": 60.0})
+    for common in (False, True):
+        std = sheet.tolerated_scatter(2, common=common)
+        assert sheet.share_within(2, std, common=common) == pytest.approx(0.95, abs=1e-4)
     # Ahead, the path changes by all of the error, up by its share H / r only.
     assert sheet.tolerated_scatter(2) > 4 * sheet.tolerated_scatter(1)
-    assert sheet_of(accuracy={"tolerance_m": 0.01}).tolerated_scatter(1) == 0
+    assert sheet_of(accuracy={"tolerance_m": 0.005}).tolerated_scatter(1) == 0
+
+
+def test_of_a_vertical_baseline_alone_errors_of_both_channels_do_level_ground_no_harm():
+    sheets = {beta: sheet_of(radar={"baseline_angle_deg": beta}) for beta in (90.0, 60.0)}
+    shares = {
+        (beta, common): sheet.share_within(2, 8.51e-3, common=common)
+        for beta, sheet in sheets.items()
+        for common in (False, True)
+    }
+    assert shares[90.0, True] > 0.999
+    assert 0.85 < shares[60.0, False] < 0.95
+    assert shares[60.0, True] < 0.98
+    assert sheets[90.0].tolerated_scatter(2, common=True) == np.inf
+
+
+@pytest.mark.parametrize("system", ["rail", "transmit_pair"])
+@pytest.mark.parametrize("referenced", [False, True])
+def test_a_tolerated_attitude_moves_a_height_by_just_the_tolerance(system, referenced):
+    sheet = sheet_of(radar={"system": system})
+    attitude = sheet.offsets()[1]
+    angle = attitude.tolerated_referenced if referenced else attitude.tolerated
+    lower, upper = sheet.instrument.separated
+    line = upper - lower
+    worst = 0.0
+    for sign in (-1, 1):
+        turn = np.deg2rad(sign * angle)
+        told = np.array([0.0, -np.sin(turn) * line[2], np.cos(turn) * line[2]])
+        step = told - line
+        worst = max(worst, sheet.height_error(step, referenced=referenced))
+        # The length stays.
+        assert np.linalg.norm(line + step) == pytest.approx(0.3)
+    assert worst == pytest.approx(0.05, rel=1e-3)
+
+
+def test_with_the_reference_the_exact_tolerance_of_the_attitude_is_less_than_the_linear_one():
+    sheet = sheet_of()
+    x, y = np.meshgrid(np.linspace(-2.5, 2.5, 5), np.linspace(10, 16, 7))
+    attitude = sheet.offsets()[1]
+    direction = np.array([0.0, -0.3, 0.0]) * np.pi / 180
+    per_degree = sheet.height_per_offset(x, y, direction)
+    # Unreferenced, degrees are small and the derivative (Eq. 12) will do.
+    assert attitude.tolerated == pytest.approx(0.05 / np.abs(per_degree).max(), rel=0.02)
+    assert attitude.tolerated_referenced < 0.95 * 5.4
+
+
+def test_the_height_error_of_a_step_is_that_of_the_exact_inversion():
+    sheet = sheet_of()
+    step = np.array([0.0, 2e-3, 1e-3])
+    moved = {
+        end: sheet.antennas[end].copy(
+            data=sheet.antennas[end].values + np.array([0, 1])[:, None, None] * step
+        )
+        for end in ENDS
+    }
+    told = sheet.antennas.assign(moved)
+    corners = [
+        abs(exact_height_error(sheet.antennas, told, x, y))
+        for x in (-2.5, -1.25, 0.0, 1.25, 2.5)
+        for y in np.linspace(10, 16, 7)
+    ]
+    assert sheet.height_error(step, referenced=False) == pytest.approx(max(corners), rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", ["box", "pit", "mound"])
+@pytest.mark.parametrize("height", [0.2, 0.3])
+def test_upright_objects_of_more_than_half_a_cycle_are_warned_of(shape, height):
+    item = {"shape": shape, "x_m": 0.0, "y_m": 13.0}
+    item |= {"depth_m" if shape == "pit" else "height_m": height}
+    item |= {"size_x_m": 0.4, "size_y_m": 0.4} if shape == "box" else {"diameter_m": 0.6}
+    sheet = sheet_of(scene={"terrain": "flat", "objects": [item]})
+    # Half of 0.471 m at 13 m.
+    told = any("half the height of ambiguity, 0.24 m" in line for line in sheet.warnings())
+    assert told == (height == 0.3 and shape != "mound")
 
 
 @pytest.mark.parametrize(
@@ -164,7 +240,7 @@ def test_tolerated_errors_meet_the_tolerance():
         ({"radar": {"position_spacing_m": 0.8 / 44}}, "imaged once"),
         ({"imaging": {"grid_spacing_m": 0.05}}, "undersampled"),
         ({"echo": {"coupling_db": 60.0}}, "sidelobes are +9 dB"),
-        ({"echo": {"snr_db": 0.0}}, "fewer than 95 %"),
+        ({"echo": {"snr_db": -10.0}}, "fewer than 95 %"),
         ({"radar": {"baseline_m": 1.0}}, "less than half the relief"),
         ({"radar": {"rail_height_m": 0.25}}, "hides all that lies behind it"),
         ({"radar": {"baseline_m": 2.5}}, "a quarter of the critical baseline"),

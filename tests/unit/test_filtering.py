@@ -7,6 +7,7 @@ import pytest
 
 from vinsar.foundations import variables
 from vinsar.processing import filtering
+from vinsar.radar.speckle import phase_std
 
 
 def speckle(seed, shape):
@@ -198,3 +199,89 @@ def test_the_gaussian_averages_as_many_looks_as_its_docstring_says():
 def test_a_gaussian_without_width_is_refused():
     with pytest.raises(ValueError, match="wider than 0"):
         filtering.gaussian(np.ones((3, 3), complex), std_px=0.0)
+
+
+def speckled_pair(cell_px, coherence, side=224, seed=0):
+    """Return two images of level ground whose resolution cells are so large."""
+    rng = np.random.default_rng(seed)
+    axis = np.abs(np.fft.fftfreq(side))
+    band = np.outer(axis <= 0.5 / cell_px[0], axis <= 0.5 / cell_px[1])
+    white = rng.standard_normal((2, side, side, 2)) @ np.array([1, 1j])
+    common, other = (np.fft.ifft2(np.fft.fft2(part) * band) for part in white)
+    return common, coherence * common + np.sqrt(1 - coherence**2) * other
+
+
+# Of the paper's cells on its grids of 2 and 5 cm. The distribution of looks takes pixels of a
+# window for independent and Goldstein's gain for that of the mean spectrum: up to a quarter high.
+@pytest.mark.parametrize("coherence", [0.975, 0.6])
+@pytest.mark.parametrize("cell_px", [(3.8, 8.8), (1.5, 3.5)])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"method": "none"},
+        {"method": "boxcar"},
+        {"method": "boxcar", "boxcar_window_px": 15},
+        {},
+        {"goldstein_alpha": 0.5},
+        {"goldstein_patch_px": 32},
+    ],
+)
+def test_the_filter_s_looks_give_the_phase_noise_of_filtered_speckle(changes, cell_px, coherence):
+    options = {
+        "method": "goldstein",
+        "goldstein_alpha": 0.8,
+        "goldstein_patch_px": 64,
+        "goldstein_step_px": 8,
+        "boxcar_window_px": 5,
+    } | changes
+    lower, upper = speckled_pair(cell_px, coherence)
+    product = variables.dataset(
+        "interferogram",
+        {"interferogram": lower * upper.conj(), "coherence": np.ones(lower.shape)},
+        {"x": np.arange(lower.shape[1]) * 0.02, "y": 1 + np.arange(lower.shape[0]) * 0.02},
+    )
+    phase = np.angle(filtering.apply(product, **options)["interferogram"].values)
+    looks = filtering.effective_looks(coherence, cell_px, **options)
+    ratio = phase.std() / float(phase_std(coherence, looks))
+    assert 0.75 < ratio < 1.1
+    if changes.get("method") == "none":
+        assert looks == 1
+
+
+def test_a_wide_boxcar_has_the_looks_of_its_area_in_cells_and_of_the_weighting():
+    options = {
+        "method": "boxcar",
+        "goldstein_alpha": 0.8,
+        "goldstein_patch_px": 32,
+        "goldstein_step_px": 8,
+        "boxcar_window_px": 81,
+    }
+    cells = 81**2 / (2 * 4)
+    looks = filtering.effective_looks(0.9, (2.0, 4.0), **options)
+    # The window's ends cut cells: a cell in 81 of each side.
+    assert looks == pytest.approx(cells, rel=0.1)
+    # A weighting w correlates the speckle over sum(w^4) / sum(w^2)^2 of a cell: 35/18 for Hann.
+    # Noise of the bands' ends is half as strong in the middle of the spectrum along y.
+    even = filtering.effective_looks(0.9, (2.0, 4.0), **options, shifted=1.0)
+    assert even / looks == pytest.approx(2, rel=0.05)
+    hann = filtering.effective_looks(0.9, (2.0, 4.0), **options, windows=("hann", "rectangular"))
+    assert looks / hann == pytest.approx(35 / 18, rel=0.03)
+
+
+def test_the_baseline_s_share_of_the_noise():
+    assert filtering.shifted_share(0.9, 0.9) == 1
+    assert filtering.shifted_share(1.0, 1.0) == 0
+    assert filtering.shifted_share(0.8, 1.0) == 0
+    # Little of either: noise adds up.
+    assert filtering.shifted_share(0.99 * 0.98, 0.99) == pytest.approx(1 / 3, rel=0.03)
+
+
+@pytest.mark.parametrize("method", filtering.FILTERS)
+def test_every_filter_has_its_looks(method):
+    options = {"goldstein_alpha": 0.8, "goldstein_patch_px": 32, "boxcar_window_px": 5}
+    assert filtering.effective_looks(0.9, (2.0, 4.0), method=method, **options) >= 1
+
+
+def test_an_unknown_filter_has_no_looks():
+    with pytest.raises(ValueError, match="no filter 'medain'; there are goldstein"):
+        filtering.effective_looks(0.9, (2.0, 4.0), method="medain")

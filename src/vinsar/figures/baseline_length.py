@@ -9,7 +9,7 @@ import numpy as np
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import swept_section
-from vinsar.radar import instrument, speckle
+from vinsar.radar import instrument
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,11 +62,15 @@ def draw(products: Products, study: Study) -> Figure:
     limits = sweeps.around(length, [quarter], low=0.85, high=1.18)
 
     axes = style.place(figure, left, bottom, width, tall)
-    count = sweeps.looks(study, name)
     found, _, _ = sweeps.spread(sweep["coherence"])
-    bounds = {
-        f"bound, {source}, {count:.1f} looks": (
-            ambiguity / (2 * np.pi) * speckle.phase_std(coherence, count)
+    expected = {
+        f"predicted, {source}": (
+            ambiguity
+            / (2 * np.pi)
+            * [
+                float(sweeps.phase_std(study, name, part, value))
+                for part, value in zip(planned, coherence, strict=True)
+            ]
         )
         for source, coherence in (("level ground", theory), ("measured coherence", found))
     }
@@ -75,10 +79,10 @@ def draw(products: Products, study: Study) -> Figure:
     styles: list[Any] = ["--", ":"]
     lines = [
         axes.plot(length, 100 * values, color=style.GREY, linestyle=line, label=label)[0]
-        for (label, values), line in zip(bounds.items(), styles, strict=True)
+        for (label, values), line in zip(expected.items(), styles, strict=True)
     ]
     sweeps.log_x(axes, limits)
-    sweeps.log_y(axes, sweeps.around(spreads, *(100 * values for values in bounds.values())))
+    sweeps.log_y(axes, sweeps.around(spreads, *(100 * values for values in expected.values())))
     best = _best(axes, sweep, length)
     axes.set_xlabel("baseline B (m)")
     axes.set_ylabel("height error (cm)")
@@ -212,14 +216,13 @@ FIGURES = {
         draw=draw,
         title="Length of the baseline",
         caption=(
-            "Height error against the length of the baseline: standard deviation over the whole "
-            "scene and on visible ground, and 1.48 times the median absolute deviation, which "
-            "disregards the cells that unwrapped to another cycle. The bound is that of Cramer "
-            "and Rao for a resolution cell's looks in the coherence window, once with the "
-            "coherence of level ground and once with the measured one; the phase filter averages "
-            "over more than that window."
+            "Height error against the length of the baseline: standard deviation over the "
+            "whole scene and on visible ground, and 1.48 median absolute deviations, which "
+            "leave out the cells that unwrapped to another cycle. The prediction is the noise "
+            "that the looks of the phase filter leave, once with the coherence of level ground "
+            "and once with the one measured."
         ),
-        sections=("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
+        sections=("figures", "radar", "scene", "imaging", "filtering", "sweeps"),
         sweeps=("baseline_length",),
         numbers=numbers,
     ),

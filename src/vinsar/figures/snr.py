@@ -43,12 +43,13 @@ def draw(products: Products, study: Study) -> Figure:
     sweep = variables.swept(products["sweeps/snr"], "echo_snr_db").sortby("echo_snr_db")
     ratio = sweep["echo_snr_db"].values
     radar = swept_section(study, "snr", "radar")
-    place = instrument.middle(swept_section(study, "snr", "scene"))
+    scene = swept_section(study, "snr", "scene")
+    place = instrument.middle(scene)
     planned = instrument.Instrument.planned(radar)
-    coherence = speckle.noise_coherence(ratio) * planned.geometric_coherence(*place)
-    count = sweeps.looks(study, "snr")
+    filled = planned.filled(scene.x_min_m, scene.x_max_m, place[1])
+    coherence = speckle.pixel_coherence(planned.geometric_coherence(*place), ratio, filled)
     per_radian = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi)
-    bound = per_radian * speckle.phase_std(coherence, count)
+    predicted = per_radian * sweeps.phase_std(study, "snr", planned, coherence)
     figure = style.new_figure(style.ONE_COLUMN_MM, 91.0)
     axes = style.place(figure, 13.0, 33.0, 72.0, 52.0)
     values = []
@@ -60,10 +61,10 @@ def draw(products: Products, study: Study) -> Figure:
     handles.append(sweeps.band_patch())
     handles += axes.plot(
         ratio,
-        bound,
+        predicted,
         color=style.GREY,
         linestyle="--",
-        label=f"bound, level ground, {count:.1f} looks",
+        label="predicted, level ground",
     )
     random = 100 * float(planned.random_phase_std(*place))
     handles.append(
@@ -75,10 +76,10 @@ def draw(products: Products, study: Study) -> Figure:
             label=f"random phase: {random:.1f} cm",
         )
     )
-    limits = sweeps.around(*values, bound, [random])
+    limits = sweeps.around(*values, predicted, [random])
     sweeps.log_y(axes, limits)
     axes.xaxis.set_major_locator(style.round_ticks(7))
-    axes.set_xlabel("signal-to-noise ratio of a resolution cell (dB)")
+    axes.set_xlabel("signal-to-noise ratio of a range cell (dB)")
     axes.set_ylabel("height error (cm)")
     axes.set_title("Spread of the height error under thermal noise")
     sweeps.legend(figure, handles, 13.0, 2.0, 1)
@@ -107,11 +108,10 @@ FIGURES = {
         draw=draw,
         title="Thermal noise",
         caption=(
-            "Height error against the signal-to-noise ratio of a range-compressed resolution "
-            "cell, with the Cramer-Rao bound for the looks in the coherence window. The phase "
-            "filter averages over more than that window."
+            "Height error against the signal-to-noise ratio of a range cell, with the noise that "
+            "the looks of the phase filter leave of level ground."
         ),
-        sections=("figures", "radar", "scene", "imaging", "interferogram", "sweeps"),
+        sections=("figures", "radar", "scene", "imaging", "filtering", "sweeps"),
         sweeps=("snr",),
         numbers=numbers,
     ),

@@ -8,7 +8,7 @@ On the paper's rail the errors of the baseline are Eqs. 5 and 12 with their exac
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +16,13 @@ import numpy as np
 
 from vinsar.foundations import tables
 from vinsar.foundations.constants import AXES
+from vinsar.processing import filtering
 from vinsar.radar import aperture, instrument, speckle, trajectory
 from vinsar.radar.instrument import Instrument
 from vinsar.study import validation
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable
 
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
@@ -39,7 +40,7 @@ SECTIONS = (
     "echo",
     "suppression",
     "imaging",
-    "interferogram",
+    "filtering",
     "height",
     "accuracy",
 )
@@ -56,7 +57,66 @@ _REGISTRATION_SHARE = 0.1
 _RANGE_SHARE, _WIDTH_SHARE = 0.9, 0.7
 _SIDELOBES_DB = -10.0
 _SAME_M = 1e-9
+
+# Objects with vertical sides.
+_UPRIGHT = ("box", "stump", "ditch", "pit")
+
+# Errors tried for a tolerance, as shares of the largest.
+_SIZES = np.geomspace(1e-3, 1.0, 13)
+
+# Parts of the image, along x and along y, over which shares of its heights are averaged.
+_PARTS = 5
+
+# Targets over the scene's width for the mean of their phases, and Newton's steps to their range.
+_TARGETS, _STEPS = 41, 4
 _BYTES_PER_SAMPLE = 8
+
+
+def _middles(low: float, high: float) -> Floats:
+    """Return the middles of some parts of an extent."""
+    return low + (high - low) * (np.arange(_PARTS) + 0.5) / _PARTS
+
+
+def filter_looks(
+    planned: Instrument,
+    x: float,
+    y: ArrayLike,
+    coherence: ArrayLike,
+    *,
+    options: filtering.Filtering,
+    imaging: Imaging,
+) -> Floats:
+    """Return over how many independent looks the phase filter averages level ground.
+
+    Parameters
+    ----------
+    planned
+        The instrument.
+    x, y
+        Places, m.
+    coherence
+        Coherence there, of a shape that broadcasts with `y`.
+    options, imaging
+        Sections ``filtering`` and ``imaging`` of the configuration.
+
+    Returns
+    -------
+    ndarray
+        Looks, 1 or more (`filtering.effective_looks`).
+    """
+    y, coherence = np.broadcast_arrays(np.asarray(y, float), np.asarray(coherence, float))
+    looks = np.empty(y.shape)
+    share = filtering.shifted_share(coherence, planned.geometric_coherence(x, y))
+    for row in np.unique(y):
+        across, ahead = planned.resolution(x, row) / imaging.grid_spacing_m
+        looks[y == row] = filtering.effective_looks(
+            coherence[y == row],
+            (float(ahead), float(across)),
+            windows=(imaging.range_window, imaging.aperture_window),
+            shifted=share[y == row],
+            **options.model_dump(),
+        )
+    return looks
 
 
 @dataclass(frozen=True)
@@ -166,48 +226,100 @@ class Sheet:
         middle = self.instrument.slant_range(self.x, instrument.middle(self.scene)[1])
         return part.snr_db - 40 * np.log10(self.instrument.slant_range(self.x, y) / middle)
 
-    def coherence(self, y: ArrayLike, position_errors: ArrayLike = 0.0) -> Floats:
-        """Return the coherence that baseline, noise and position errors leave.
+    def complex_coherence(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        position_errors: ArrayLike = 0.0,
+        *,
+        common: bool = False,
+    ) -> NDArray[np.complexfloating]:
+        """Return the coherence of level ground that baseline, noise and position errors leave.
 
-        White position errors that give the echoes phases of variance v leave ``exp(-v)`` of a
+        White position errors that give the echoes phases of variance v leave ``s = exp(-v)`` of a
         target's power in focus and spread the rest evenly over all paths' growths from position to
-        position, which a wavelength of growth repeats. The scene fills the share w of it, with
-        targets of other phases: ``s / (s + (1 - s) w)`` is left, with ``s = exp(-v)``.
+        position, which a wavelength of growth repeats (`speckle.pixel_coherence`). If both channels
+        share the errors, they show each other's spread targets alike, each at the phase difference
+        of its own place instead of the pixel's: without a change over level ground if the baseline
+        is vertical, otherwise with a mean phase and a coherence of their own.
+
+        Parameters
+        ----------
+        x, y
+            Points, m, of shapes that broadcast.
+        position_errors
+            Standard deviation of the echoes' phase at each position and channel, rad.
+        common
+            Whether both channels share the errors.
+
+        Returns
+        -------
+        ndarray
+            Coherence; its angle is the error of the phase, rad.
+        """
+        x, y, errors = np.broadcast_arrays(x, y, np.asarray(position_errors, float))
+        part, planned = self.scene, self.instrument
+        filled = planned.filled(part.x_min_m, part.x_max_m, y)
+        focused = np.exp(-(errors**2))
+        return speckle.pixel_coherence(
+            planned.geometric_coherence(x, y),
+            self.snr_db(y),
+            filled,
+            focused,
+            self._spread_phasor(x, y) if common else 0j,
+        )
+
+    def _spread_phasor(self, x: Floats, y: Floats) -> NDArray[np.complexfloating]:
+        """Return the mean of what level ground at a pixel's range adds to its interferogram.
+
+        The targets over the scene's width whose lower path is the pixel's, evenly by the growth of
+        their paths, at the phase by which their upper path differs.
+        """
+        part, planned = self.scene, self.instrument
+        across = np.linspace(part.x_min_m, part.x_max_m, _TARGETS).reshape(-1, *(1,) * x.ndim)
+        wanted = aperture.path(planned.lower, x, y)
+        ahead = np.broadcast_to(y, np.broadcast_shapes(across.shape, y.shape)).copy()
+        for _ in range(_STEPS):
+            slope = aperture.gradients(planned.lower, across, ahead)[0][1]
+            ahead -= (aperture.path(planned.lower, across, ahead) - wanted) / slope
+        longer = aperture.path(planned.upper, across, ahead) - aperture.path(planned.upper, x, y)
+        weight = np.abs(np.gradient(planned.growth(across, ahead), axis=0))
+        phasor = np.exp(2j * np.pi / planned.wavelength * longer)
+        return np.asarray((weight * phasor).sum(axis=0) / weight.sum(axis=0))
+
+    def coherence(self, y: ArrayLike, position_errors: ArrayLike = 0.0) -> Floats:
+        """Return the coherence at the middle of the image's rows, with independent errors.
 
         Parameters
         ----------
         y
             Distance ahead, m.
         position_errors
-            Standard deviation of the echoes' phase at each position and channel, rad.
+            As in `complex_coherence`.
 
         Returns
         -------
         ndarray
             Coherence.
         """
-        part = self.scene
-        focused = np.exp(-(np.asarray(position_errors, float) ** 2))
-        filled = np.minimum(1, self.instrument.filled(part.x_min_m, part.x_max_m, y))
-        return np.asarray(
-            self.instrument.geometric_coherence(self.x, y)
-            * speckle.noise_coherence(self.snr_db(y))
-            * focused
-            / (focused + (1 - focused) * filled)
-        )
+        return np.abs(self.complex_coherence(self.x, y, position_errors))
 
-    def looks(self, y: ArrayLike) -> Floats:
-        """Return the independent looks in the coherence window, at least 1."""
-        side = self.study.interferogram.coherence_window_px * self.study.imaging.grid_spacing_m
-        return self.instrument.looks(side, self.x, y)
+    def looks(self, y: ArrayLike, coherence: ArrayLike) -> Floats:
+        """Return over how many independent looks the phase filter averages (`filter_looks`)."""
+        return filter_looks(
+            self.instrument,
+            self.x,
+            y,
+            coherence,
+            options=self.study.filtering,
+            imaging=self.study.imaging,
+        )
 
     def height_std(self, y: ArrayLike, position_errors: ArrayLike = 0.0) -> Floats:
         """Return the predicted standard deviation of the height on visible ground, m.
 
-        The Cramer-Rao bound of the phase for the looks of the coherence window, and no more than a
-        random phase makes (`speckle.phase_std`). The phase filter averages over more than the
-        window, and speckle has tails: as long as the phase unwraps, the prediction is good within a
-        factor of 2.5, high rather than low where noise decides.
+        That of the phase of the filter's looks (`speckle.phase_std`), as long as it unwraps; of a
+        phase that is noise, that of heights anywhere within the height of ambiguity.
 
         Parameters
         ----------
@@ -221,9 +333,11 @@ class Sheet:
         ndarray
             Standard deviation, m.
         """
-        phase = speckle.phase_std(self.coherence(y, position_errors), self.looks(y))
-        per_radian = self.instrument.height_of_ambiguity(self.x, y) / (2 * np.pi)
-        return np.minimum(per_radian * phase, self.instrument.random_phase_std(self.x, y))
+        return self._height_std(self.x, y, self.coherence(y, position_errors))
+
+    def _height_std(self, x: ArrayLike, y: ArrayLike, coherence: Floats) -> Floats:
+        per_radian = self.instrument.height_of_ambiguity(x, y) / (2 * np.pi)
+        return np.asarray(per_radian * speckle.phase_std(coherence, self.looks(y, coherence)))
 
     def scene_height_std(self, axis: int = 0, position_std_m: float = 0.0) -> float:
         """Return the predicted height noise over the image: the root of its mean square, m.
@@ -231,7 +345,7 @@ class Sheet:
         Parameters
         ----------
         axis
-            Axis of white position errors.
+            Axis of white position errors, of each channel's own.
         position_std_m
             Their standard deviation, m.
         """
@@ -239,6 +353,56 @@ class Sheet:
         x, y = np.linspace(part.x_min_m, part.x_max_m, 5)[:, None], self.places
         errors = position_std_m * self.phase_per_position(x, y, axis)
         return float(np.sqrt(np.mean(self.height_std(y, errors) ** 2)))
+
+    def share_within(self, axis: int, position_std_m: float, *, common: bool) -> float:
+        """Return the share of the heights of level ground that position errors leave within.
+
+        Within the tolerance, over the image, after the height reference has taken the mean phase of
+        its points.
+
+        Parameters
+        ----------
+        axis
+            Axis of the white position errors.
+        position_std_m
+            Their standard deviation, m.
+        common
+            Whether both channels share the errors.
+
+        Returns
+        -------
+        float
+            Share, 0 to 1.
+        """
+        from scipy.stats import norm
+
+        part, planned = self.study.imaging, self.instrument
+
+        def fringe(x: Floats, y: Floats) -> tuple[NDArray[np.complexfloating], Floats]:
+            errors = position_std_m * self.phase_per_position(x, y, axis)
+            return self.complex_coherence(x, y, errors, common=common), errors**2
+
+        x, y = (
+            _middles(getattr(part, f"{axis}_min_m"), getattr(part, f"{axis}_max_m"))
+            for axis in "xy"
+        )
+        x = x[:, None]
+        found, variance = fringe(x, y)
+        shift = np.angle(found)
+        if common:
+            shift -= np.median(np.angle(fringe(*self._reference())[0]))
+        per_radian = planned.height_of_ambiguity(x, y) / (2 * np.pi)
+        bias = per_radian * shift
+        # A scan draws as many errors as it has positions: sqrt(2 / N) of their variance v, of
+        # which the shift has the share of exp(v) - 1, what is spread over what is in focus.
+        chance = np.abs(bias) * variance / np.maximum(-np.expm1(-variance), 1e-12)
+        std = np.hypot(
+            self._height_std(x, y, np.abs(found)), chance * np.sqrt(2 / planned.positions)
+        )
+        std = np.maximum(std, 1e-12)
+        most = self.study.accuracy.tolerance_m
+        within = norm.cdf((most - bias) / std) - norm.cdf((-most - bias) / std)
+        return float(within.mean())
 
     def shadow_length(self, y: ArrayLike) -> Floats:
         """Return how far an obstacle as high as the scene's relief hides the ground behind it, m.
@@ -315,40 +479,103 @@ class Sheet:
             Length and attitude of the baseline (Eqs. 5 and 12), and offsets along the axes.
         """
         lower, upper = self.instrument.separated
-        along = (upper - lower) / self.instrument.baseline
+        line, length = upper - lower, self.instrument.baseline
+        along = line / length
         # In the plane across the aperture, upwards from horizontal.
-        turned = np.array([0.0, -along[2], along[1]]) * self.instrument.baseline
-        degree = np.pi / 180
-        cases: Mapping[str, tuple[str, float, Floats]] = {
-            "length of the baseline (Eq. 5)": ("mm", 1e-3, along),
-            "attitude of the baseline (Eq. 12)": ("deg", degree, turned),
-            **{
-                f"upper antenna along {name}": ("mm", 1e-3, np.eye(3)[axis])
-                for axis, name in enumerate(AXES)
-            },
-        }
-        return [self._tolerance(name, *case) for name, case in cases.items()]
+        up = np.array([0.0, -line[2], line[1]])
 
-    def _tolerance(self, name: str, unit: str, size: float, direction: Floats) -> Tolerance:
-        part = self.study.imaging
-        x, y = np.meshgrid(
-            np.linspace(part.x_min_m, part.x_max_m, 5), np.linspace(part.y_min_m, part.y_max_m, 7)
-        )
-        error = size * self.height_per_offset(x, y, direction)
-        points = self._reference()
-        per_difference = self.instrument.height_per_difference
-        constant = np.median(
-            size * self.height_per_offset(*points, direction) / per_difference(*points)
-        )
-        referenced = error - constant * per_difference(x, y)
-        most = self.study.accuracy.tolerance_m
+        def turn(angle: float) -> Floats:
+            return np.asarray((math.cos(angle) - 1) * line + math.sin(angle) * up)
+
+        def straight(direction: Floats) -> Callable[[float], Floats]:
+            return lambda size: np.asarray(size * direction)
+
+        millimetre, degree = ("mm", 1e-3, length), ("deg", np.pi / 180, np.pi / 2)
+        return [
+            self._tolerance("length of the baseline (Eq. 5)", *millimetre, along, straight(along)),
+            self._tolerance("attitude of the baseline (Eq. 12)", *degree, up, turn),
+            *(
+                self._tolerance(f"upper antenna along {name}", *millimetre, axis, straight(axis))
+                for name, axis in zip(AXES, np.eye(3), strict=True)
+            ),
+        ]
+
+    def _tolerance(
+        self,
+        name: str,
+        unit: str,
+        size: float,
+        largest: float,
+        direction: Floats,
+        step: Callable[[float], Floats],
+    ) -> Tolerance:
+        """Return an error's tolerance: a unit's size, the largest looked at, its step."""
         return Tolerance(
             name,
             unit,
             size * self.height_per_offset(self.x, self.places, direction),
-            most / max(float(np.abs(error).max()), 1e-300),
-            most / max(float(np.abs(referenced).max()), 1e-300),
+            *(
+                min(self._tolerated(step, sign * largest, referenced) for sign in (1, -1)) / size
+                for referenced in (False, True)
+            ),
         )
+
+    def _tolerated(
+        self, step: Callable[[float], Floats], largest: float, referenced: bool
+    ) -> float:
+        """Return the least error, towards the largest, that moves a height by the tolerance."""
+        from scipy.optimize import brentq
+
+        def excess(size: float) -> float:
+            return self.height_error(step(size), referenced=referenced) - most
+
+        most, below = self.study.accuracy.tolerance_m, 0.0
+        for size in largest * _SIZES:
+            if excess(size) > 0:
+                return abs(float(brentq(excess, below, size)))
+            below = size
+        return math.inf
+
+    def height_error(self, step: Floats, *, referenced: bool) -> float:
+        """Return by how much a wrongly told upper antenna moves a height of the image, at most.
+
+        The exact inversion of the phases of level ground, on a grid over the image, with the upper
+        one of the antennas that the baseline separates told a step away from where it is.
+
+        Parameters
+        ----------
+        step
+            The step (axis,), m.
+        referenced
+            Whether the height reference has taken its phase constant.
+
+        Returns
+        -------
+        float
+            Largest height error, m; infinite where a phase fits no height.
+        """
+        part, planned = self.study.imaging, self.instrument
+        lower, upper = planned.lower, planned.upper
+        ends = {
+            name: getattr(upper, name) + step
+            for name in ("transmitter", "receiver")
+            if np.abs(getattr(upper, name) - getattr(lower, name)).max() > _SAME_M
+        }
+        told = replace(upper, **ends)
+
+        def phase(antenna: aperture.Aperture, x: Floats, y: Floats) -> Floats:
+            return aperture.flat_earth_phase(lower, antenna, x, y, planned.wavelength)
+
+        x, y = np.meshgrid(
+            np.linspace(part.x_min_m, part.x_max_m, 5), np.linspace(part.y_min_m, part.y_max_m, 7)
+        )
+        measured = phase(upper, x, y)
+        if referenced:
+            points = self._reference()
+            measured = measured + np.median(phase(told, *points) - phase(upper, *points))
+        *_, height = aperture.locate(lower, told, x, y, measured, planned.wavelength)
+        error = np.abs(height).max()
+        return math.inf if np.isnan(error) else float(error)
 
     def phase_per_position(self, x: ArrayLike, y: ArrayLike, axis: int) -> Floats:
         """Return the echo's phase by an error of one antenna position along an axis, rad/m.
@@ -368,12 +595,19 @@ class Sheet:
                 slope += line[..., axis] / np.linalg.norm(line, axis=-1)
         return 2 * np.pi / self.instrument.wavelength * np.abs(slope)
 
-    def tolerated_scatter(self, axis: int) -> float:
+    def tolerated_scatter(self, axis: int, *, common: bool = False) -> float:
         """Return which white position errors keep 95 % of the heights within the tolerance, m.
 
-        Standard deviation along an axis, drawn anew at each position and for each channel; errors
-        that both channels share do as much harm where the relief exceeds the height of ambiguity,
-        and none on level ground. At the worst of the image's rows, and of its middle and edges.
+        Standard deviation along an axis, drawn anew at each position; over level ground
+        (`share_within`). Relief of more than the height of ambiguity makes errors that the channels
+        share as harmful as errors of each channel's own.
+
+        Parameters
+        ----------
+        axis
+            Axis of the errors.
+        common
+            Whether both channels share them, as on a shaking vehicle, or have their own.
 
         Returns
         -------
@@ -383,18 +617,17 @@ class Sheet:
         """
         from scipy.optimize import brentq
 
-        part = self.study.imaging
-        x = np.array([part.x_min_m, self.x, part.x_max_m])
-        slope = self.phase_per_position(x[:, None], self.places, axis).max(axis=0)
-        most = self.study.accuracy.tolerance_m / OF_95_PERCENT
+        def missing(std: float) -> float:
+            return 0.95 - self.share_within(axis, std, common=common)
 
-        def excess(std: float) -> float:
-            return float(self.height_std(self.places, std * slope).max()) - most
-
-        if excess(0.0) > 0:
+        if missing(0.0) > 0:
             return 0.0
-        largest = self.instrument.wavelength
-        return float(brentq(excess, 0.0, largest)) if excess(largest) > 0 else math.inf
+        below = 0.0
+        for size in self.instrument.wavelength * _SIZES:
+            if missing(size) > 0:
+                return float(brentq(missing, below, size, xtol=1e-7))
+            below = size
+        return math.inf
 
     def coupling_db(self) -> float | None:
         """Return the coupling's strongest sidelobes in the image over the scene, dB.
@@ -469,11 +702,27 @@ class Sheet:
                 f"{cycle:.2f} m, is less than half the relief of {relief:g} m: steps of half of it "
                 "unwrap wrongly"
             )
+        found += self._ambiguous_objects()
         if np.isinf(self.shadow_length(y)).any():
             found.append(
                 f"radar.rail_height_m = {self.study.radar.rail_height_m}: an obstacle as high as "
                 "the relief hides all that lies behind it"
             )
+        return found
+
+    def _ambiguous_objects(self) -> list[str]:
+        """Return the upright objects whose sides jump by more than half a cycle."""
+        found = []
+        objects = () if self.study.measurement.file is not None else self.study.scene.objects
+        for number, item in enumerate(objects):
+            size = float(getattr(item, "height_m", getattr(item, "depth_m", 0.0)))
+            half = float(self.instrument.height_of_ambiguity(item.x_m, item.y_m)) / 2
+            if item.shape in _UPRIGHT and size > half:
+                found.append(
+                    f"scene.objects[{number}]: a {item.shape} of {size:g} m exceeds half the "
+                    f"height of ambiguity, {half:.2f} m: it may come out a cycle off, as free "
+                    "ground"
+                )
         return found
 
 
@@ -536,7 +785,7 @@ def as_markdown(sheet: Sheet) -> str:
         ("a quarter of it (m)", critical / 4, ".2f"),
         ("height of ambiguity (m)", planned.height_of_ambiguity(*place), ".3f"),
         ("coherence of level ground", sheet.coherence(y), ".3f"),
-        ("looks of the coherence window", sheet.looks(y), ".1f"),
+        ("looks of the phase filter", sheet.looks(y, sheet.coherence(y)), ".1f"),
         ("predicted height noise, 1 sigma (cm)", 100 * sheet.height_std(y), ".2f"),
         ("registration error, raised target (mm)", 1e3 * sheet.registration_shift(y), ".2f"),
         ("shadow behind an obstacle (m)", sheet.shadow_length(y), ".2f"),
@@ -561,15 +810,25 @@ def as_markdown(sheet: Sheet) -> str:
             "llrrrrr",
         ),
         "",
-        "Position errors, independent by position and channel, 1 sigma, with which 95 "
-        f"% of the heights stay within {most:g} cm (errors that both channels share, as on a "
-        "shaking vehicle or of common receivers, do no more harm than that, and none over level "
-        "ground):",
+        "Position errors, independent by position, 1 sigma, with which 95 % of the heights of "
+        f"level ground stay within {most:g} cm: independent by channel, and common to both "
+        "channels, as on a shaking vehicle. Where the relief exceeds the height of ambiguity, common errors do "
+        "as much harm as independent ones:",
         "",
     ]
-    scatter = [(name, sheet.tolerated_scatter(axis)) for axis, name in enumerate(AXES)]
-    table = [(name, _amount(1e3 * s), _amount(s / planned.wavelength)) for name, s in scatter]
-    lines.append(tables.write(("along", "tolerated (mm)", "wavelengths"), table, "lrr"))
+    scatter = [
+        (
+            name,
+            *(
+                _amount(sheet.tolerated_scatter(axis, common=common) * per)
+                for common in (False, True)
+                for per in (1e3, 1 / planned.wavelength)
+            ),
+        )
+        for axis, name in enumerate(AXES)
+    ]
+    headings = ("along", "independent (mm)", "wavelengths", "common (mm)", "wavelengths")
+    lines.append(tables.write(headings, scatter, "lrrrr"))
     found = sheet.warnings()
     lines += ["", "Warnings:", ""] if found else ["", "No warnings."]
     lines += [f"- {sentence}" for sentence in found]

@@ -312,7 +312,7 @@ def detect(
     dark = ~(coded(np.where(shaded > 0, 1.0, 0.0)) < 0.5) | ~np.isfinite(found)
     coherence = np.clip(interferogram["coherence"].values, _LEAST_COHERENCE, 1)
     # The Cramer-Rao bound of the phase.
-    noise = coded(np.abs(height_by_phase) * speckle.phase_std(coherence, looks))
+    noise = coded(np.abs(height_by_phase) * speckle.phase_bound(coherence, looks))
     surface = ground(np.where(dark, np.nan, found), x, y, options.ground_window_m)
     residual = found - surface
     certain = ~dark & (np.abs(residual) > options.noise_factor * noise)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -11,20 +12,26 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
+from vinsar.radar import waveform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     import xarray as xr
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from vinsar.foundations.configuration import Study
     from vinsar.foundations.stage import Products
 
     Complexes = NDArray[np.complexfloating]
+    Floats = NDArray[np.floating]
+    Spectra = tuple[Floats, Floats, Floats]
 
 # Patches in one batch of transforms: 4 MB, so that they stay in the cache.
 _PIXELS_PER_BATCH = 500_000
+
+# Bins of the spectrum that a filter's gain is summed over, and samples of a weighting.
+_BINS, _BAND_SAMPLES = 512, 129
 
 
 variables.declare(
@@ -251,6 +258,152 @@ def apply(interferogram: xr.Dataset, *, method: str, **options: Any) -> xr.Datas
         {"interferogram": FILTERS[method](interferogram["interferogram"].values, **options)},
         {"x": interferogram["x"].values, "y": interferogram["y"].values},
     )
+
+
+def effective_looks(
+    coherence: ArrayLike,
+    cell_px: tuple[float, float],
+    *,
+    method: str,
+    windows: tuple[waveform.WindowName, waveform.WindowName] = ("rectangular", "rectangular"),
+    shifted: ArrayLike = 0.0,
+    **options: Any,
+) -> Floats:
+    """Return over how many independent looks a filter averages level ground.
+
+    By its equivalent noise bandwidth: of the phase noise of a pixel the filter's gain leaves a
+    share of one over the looks. Noise of an image's whole band W has, multiplied with the other
+    image, the spectrum ``W^2 * W^2``. The baseline decorrelates the ends of the bands, each far
+    from the middle of the other image's band: that noise is even over the spectrum along y, and
+    half as strong in its middle.
+
+    Parameters
+    ----------
+    coherence
+        Coherence, 0 to 1.
+    cell_px
+        Resolution in y and x, pixels.
+    method
+        A key of `FILTERS`.
+    windows
+        Weightings along y and x, of the band and of the aperture.
+    shifted
+        Share of the noise that the baseline's decorrelation makes, 0 to 1 (`shifted_share`).
+    options
+        The keys of `Filtering` that the filter reads.
+
+    Returns
+    -------
+    ndarray
+        Looks, 1 or more, in the shape of `coherence`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such filter.
+    """
+    if method not in _NOISE:
+        raise ValueError(f"no filter '{method}'; there are {', '.join(_NOISE)}")
+    gamma, share = np.broadcast_arrays(np.asarray(coherence, float), np.asarray(shifted, float))
+
+    def spectra(count: int) -> Spectra:
+        return _spectra(count, cell_px, windows)
+
+    white, even = _NOISE[method](gamma, spectra, **options)
+    return np.asarray(1 / (white + share * (even - white)))
+
+
+def shifted_share(coherence: ArrayLike, geometric: ArrayLike) -> Floats:
+    """Return the share of the phase noise that the baseline's decorrelation makes.
+
+    Parameters
+    ----------
+    coherence
+        Coherence, 0 to 1.
+    geometric
+        Coherence that the baseline alone leaves.
+
+    Returns
+    -------
+    ndarray
+        ``(1 / gamma_geo^2 - 1) / (1 / gamma^2 - 1)``, at most 1.
+    """
+    gamma, geometric = np.asarray(coherence, float), np.asarray(geometric, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (1 / geometric**2 - 1) / (1 / gamma**2 - 1)
+    return np.where(np.isfinite(share), np.minimum(share, 1), 0.0)
+
+
+@lru_cache(maxsize=256)
+def _spectra(
+    count: int,
+    cell_px: tuple[float, float],
+    windows: tuple[waveform.WindowName, waveform.WindowName],
+) -> Spectra:
+    """Return spectra of noise by bin, each of sum 1: white and even along y, white along x."""
+    found = []
+    for cell, window in zip(cell_px, windows, strict=True):
+        power = waveform.window(window, _BAND_SAMPLES) ** 2
+        shape = np.correlate(power, power, "full")[_BAND_SAMPLES - 1 :]
+        offset = np.abs(np.fft.fftfreq(count)) * cell
+        white = np.interp(offset, np.linspace(0, 1, _BAND_SAMPLES), shape, right=0.0)
+        found += [white, (offset <= 1).astype(float)]
+    down, even, across = (values / values.sum() for values in found[:3])
+    return down, even, across
+
+
+def _goldstein_noise(
+    gamma: Floats,
+    spectra: Callable[[int], Spectra],
+    *,
+    goldstein_alpha: float,
+    goldstein_patch_px: int,
+    **_: Any,
+) -> tuple[Floats, Floats]:
+    """Return what a patch's expected gain leaves of white and of even noise.
+
+    The expected magnitude spectrum is a peak of the coherence at the ground's fringe and
+    Rayleigh-distributed speckle around it. Where relief spreads the fringe, more is left.
+    """
+    down, even, across = spectra(goldstein_patch_px)
+    powers = np.outer(down, across), np.outer(even, across)
+    magnitude = np.sqrt(np.pi / 4 * powers[0])
+    magnitude[0, 0] = 0
+    shifts = [(row, column) for row in (0, 1, -1) for column in (0, 1, -1)]
+    smoothed = sum(np.roll(magnitude, shift, axis=(0, 1)) for shift in shifts)
+    # Smoothing carries the peak to the bins next to it.
+    near = tuple(np.transpose(shifts))
+    peak = (gamma + smoothed[0, 0]) ** (2 * goldstein_alpha)
+    beside = (gamma[..., None] + smoothed[near]) ** (2 * goldstein_alpha)
+    gain = smoothed ** (2 * goldstein_alpha)
+    gain[near] = 0
+    white, even = ((beside @ power[near] + (gain * power).sum()) / peak for power in powers)
+    return white, even
+
+
+def _boxcar_noise(
+    gamma: Floats, spectra: Callable[[int], Spectra], *, boxcar_window_px: int, **_: Any
+) -> tuple[Floats, Floats]:
+    mean = np.zeros(_BINS)
+    mean[:boxcar_window_px] = 1 / boxcar_window_px
+    gain = np.abs(np.fft.fft(mean)) ** 2
+    down, even, across = (float(axis @ gain) for axis in spectra(_BINS))
+    return np.full(gamma.shape, down * across), np.full(gamma.shape, even * across)
+
+
+def _no_noise_less(
+    gamma: Floats, spectra: Callable[[int], Spectra], **_: Any
+) -> tuple[Floats, Floats]:
+    del spectra
+    return np.ones(gamma.shape), np.ones(gamma.shape)
+
+
+# What of a pixel's white and even noise (`effective_looks`) each filter leaves.
+_NOISE: dict[str, Callable[..., tuple[Floats, Floats]]] = {
+    "goldstein": _goldstein_noise,
+    "boxcar": _boxcar_noise,
+    "none": _no_noise_less,
+}
 
 
 def _filtered(products: Products, study: Study) -> xr.Dataset:

@@ -1,4 +1,4 @@
-"""The length of the baseline: the sweep, the bound and the optimum."""
+"""The length of the baseline: the sweep, the prediction and the optimum."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from vinsar.figures import FIGURES, baseline_length
-from vinsar.figures.drawing import sweeps
+from vinsar.processing import filtering
+from vinsar.radar.speckle import phase_std
 
 
-def test_baseline_length_shows_the_sweep_the_bound_and_the_optimum(
+def test_baseline_length_shows_the_sweep_the_prediction_and_the_optimum(
     make_sweep, draw, written, lines_of, products, study
 ):
     length = [0.1, 0.2, 0.3, 0.5, 1.0]
@@ -23,20 +24,18 @@ def test_baseline_length_shows_the_sweep_the_bound_and_the_optimum(
     np.testing.assert_allclose(lines["std, visible ground"].get_ydata(), 50 * std)
     robust = 148.26 * sweep["mad"].sel(region="visible_ground").mean("realization")
     np.testing.assert_allclose(lines["1.48 MAD, visible ground"].get_ydata(), robust)
-    # Written out: the coherence of level ground, the looks of the window, the phase, the height.
+    # Written out: the coherence of level ground, the looks of the filter, the phase, the height.
     r1, wavelength, cell = np.hypot(11.0, 2.0), 299_792_458.0 / 14e9, 299_792_458.0 / 4e9
     r2 = np.hypot(11.0, 2.0 + np.array(length))
     # The channels share the wavenumbers from 13 GHz at y / r1 to 15 GHz at y / r2.
     gamma = (15 / r2 - 13 / r1) / (2 / np.sqrt(r1 * r2))
-    looks = 0.25**2 / (wavelength * r1 / 1.6 * cell * r1 / 11)
-    phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
+    cells = cell * r1 / 11 / 0.05, wavelength * r1 / 1.6 / 0.05
+    filters = study.filtering.model_dump() | study.sweeps["baseline_length"].base["filtering"]
+    looks = filtering.effective_looks(gamma, cells, shifted=1.0, **filters)
     height = wavelength * r2 / (2 * np.array(length))
-    bound = height / (2 * np.pi) * phase
+    expected = height / (2 * np.pi) * phase_std(gamma, looks)
     critical = np.sqrt((15 / 13 * r1) ** 2 - 11**2) - 2
-    assert sweeps.looks(study, "baseline_length") == pytest.approx(looks)
-    np.testing.assert_allclose(
-        lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), 100 * bound
-    )
+    np.testing.assert_allclose(lines["predicted, level ground"].get_ydata(), 100 * expected)
     np.testing.assert_allclose(ambiguity.lines[0].get_ydata(), height)
     np.testing.assert_allclose(coherence.lines[1].get_ydata(), gamma)
     for axes in figure.axes:

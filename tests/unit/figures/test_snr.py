@@ -1,4 +1,4 @@
-"""Thermal noise: the sweep and the bound."""
+"""Thermal noise: the sweep and the prediction."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vinsar.figures.drawing import sweeps
 from vinsar.radar.instrument import Instrument
 
 
-def test_snr_shows_the_sweep_and_the_bound(draw, lines_of, products, study):
+def test_snr_shows_the_sweep_and_the_prediction(draw, lines_of, products, study):
     lines = lines_of(draw("snr", products, study).axes[0])
     sweep = products["sweeps/snr"]
     ratio = sweep["echo_snr_db"].values
@@ -19,13 +19,11 @@ def test_snr_shows_the_sweep_and_the_bound(draw, lines_of, products, study):
     )
     np.testing.assert_array_equal(lines["std, whole scene"].get_xdata(), ratio)
     planned, place = Instrument.planned(study.radar), (0.0, 11.0)
-    gamma = planned.geometric_coherence(*place) / (1 + 10 ** (-ratio / 10))
-    looks = sweeps.looks(study, "snr")
-    phase = np.sqrt((1 - gamma**2) / (2 * looks * gamma**2))
+    filled = planned.filled(study.scene.x_min_m, study.scene.x_max_m, 11.0)
+    gamma = planned.geometric_coherence(*place) / (1 + filled * 10 ** (-ratio / 10))
+    phase = sweeps.phase_std(study, "snr", planned, gamma)
     expected = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi) * phase
-    np.testing.assert_allclose(
-        lines[f"bound, level ground, {looks:.1f} looks"].get_ydata(), expected
-    )
+    np.testing.assert_allclose(lines["predicted, level ground"].get_ydata(), expected)
 
 
 def test_it_is_as_wide_as_a_column(usual):

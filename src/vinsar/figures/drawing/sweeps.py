@@ -9,7 +9,8 @@ import numpy as np
 
 from vinsar.figures.drawing import style
 from vinsar.foundations.configuration import swept_section
-from vinsar.radar import instrument
+from vinsar.prediction import design
+from vinsar.radar import instrument, speckle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,15 +160,31 @@ def around(*values: Any, low: float = 0.75, high: float = 1.35) -> tuple[float, 
     return float(known.min()) * low, float(known.max()) * high
 
 
-def looks(study: Study, sweep: str) -> float:
-    """Return the independent looks in the coherence window of a sweep's cases, at least 1.
+def phase_std(
+    study: Study, sweep: str, planned: instrument.Instrument, coherence: Floats
+) -> Floats:
+    """Return the predicted standard deviation of the filtered phase in a sweep's cases, rad.
 
-    The window's area over that of a resolution cell in the middle of the scene. It represents the
-    averaging of the phase filter, which has no fixed window.
+    Parameters
+    ----------
+    study
+        The configuration.
+    sweep
+        Name of the sweep.
+    planned
+        The instrument.
+    coherence
+        Coherence in the middle of the scene.
+
+    Returns
+    -------
+    ndarray
+        Standard deviation, of level ground.
     """
-    radar, scene, imaging, interferogram = (
-        swept_section(study, sweep, name) for name in ("radar", "scene", "imaging", "interferogram")
+    scene, imaging, options = (
+        swept_section(study, sweep, name) for name in ("scene", "imaging", "filtering")
     )
-    side = interferogram.coherence_window_px * imaging.grid_spacing_m
-    planned = instrument.Instrument.planned(radar)
-    return float(planned.looks(side, *instrument.middle(scene)))
+    looks = design.filter_looks(
+        planned, *instrument.middle(scene), coherence, options=options, imaging=imaging
+    )
+    return speckle.phase_std(coherence, looks)
