@@ -13,7 +13,7 @@ import pkgutil
 from typing import TYPE_CHECKING, Any
 
 from vinsar.figures.drawing.declaration import Figure
-from vinsar.figures.drawing.files import save
+from vinsar.figures.drawing.files import save, shown_inline
 from vinsar.figures.drawing.style import colormap
 from vinsar.figures.drawing.thumbnails import Thumbnail
 from vinsar.foundations.errors import ConfigurationError, Fault
@@ -25,7 +25,17 @@ if TYPE_CHECKING:
     from vinsar.foundations.configuration import Study
 
 
-__all__ = ["FIGURES", "MODULES", "THUMBNAILS", "Figure", "Thumbnail", "check", "colormap", "save"]
+__all__ = [
+    "FIGURES",
+    "MODULES",
+    "THUMBNAILS",
+    "Figure",
+    "Thumbnail",
+    "check",
+    "colormap",
+    "save",
+    "shown_inline",
+]
 
 
 def _modules() -> Iterator[ModuleType]:

@@ -19,7 +19,7 @@ from rocrate.model import ContextEntity
 from rocrate.model.computationalworkflow import ComputationalWorkflow
 from rocrate.rocrate import ROCrate
 
-import vinsar
+from vinsar._version import __version__
 from vinsar.foundations.configuration import Study
 from vinsar.results import lineage, provenance, storage
 from vinsar.results.lineage import SOURCE
@@ -380,7 +380,7 @@ class _Description:
             f"#tool/{rule}",
             "SoftwareApplication",
             name=f"vinsar {rule}",
-            version=vinsar.__version__,
+            version=__version__,
             softwareVersion=f"{attributes['source']}, commit {attributes['vinsar_commit']}",
             input=[*(files[name] for name in read), *given],
             output=[files[record["file"]] for record in records],
@@ -398,7 +398,7 @@ class _Description:
             properties={
                 "name": "vinsar: forward-looking InSAR from raw echoes to heights",
                 **_size_and_kind(self.folder / _WORKFLOW),
-                "version": vinsar.__version__,
+                "version": __version__,
                 "license": {"@id": _license()["@id"]},
                 "conformsTo": {
                     "@id": "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
@@ -453,7 +453,7 @@ class _Description:
         root["description"] = (
             "A simulated study of a vehicle-mounted forward-looking interferometric SAR, from raw "
             f"echoes to heights: its datasets, figures and claims, made by vinsar "
-            f"{vinsar.__version__} (commit {', '.join(commits)}), with its sources and "
+            f"{__version__} (commit {', '.join(commits)}), with its sources and "
             f"configuration. To compute it again: cd {SOURCE} && ./run --configfile "
             f"../{CONFIGURATION}"
         )

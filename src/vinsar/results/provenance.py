@@ -11,12 +11,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import vinsar
+from vinsar._version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-_PACKAGE = Path(vinsar.__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = (
     "dask", "finufft", "kamui", "matplotlib", "netCDF4", "numba", "numpy", "rasterio",
     "scikit-image", "scipy", "whirlwind-insar", "xarray",
@@ -62,7 +62,7 @@ def sources_of(*modules: str) -> list[Path]:
 
 
 def _file_of(name: str) -> Path | None:
-    place = _PACKAGE.joinpath(*name.removeprefix(f"{vinsar.__name__}.").split("."))
+    place = _PACKAGE.joinpath(*name.removeprefix("vinsar.").split("."))
     for candidate in (place.with_suffix(".py"), place / "__init__.py"):
         if candidate.is_file():
             return candidate
@@ -171,7 +171,7 @@ def describe(
         Attributes; structured ones as JSON.
     """
     return {
-        "source": f"vinsar {vinsar.__version__}",
+        "source": f"vinsar {__version__}",
         "vinsar_commit": commit(),
         "vinsar_study": study,
         "vinsar_stage": stage,

@@ -126,7 +126,7 @@ def _is_label(values: xr.DataArray) -> bool:
     return values.dtype.kind in "UOT" or not (ordered and index.is_unique)
 
 
-def read(path: str | Path, product: str) -> xr.Dataset:
+def read(path: str | Path, product: str | None = None) -> xr.Dataset:
     """Read a product into memory.
 
     Parameters
@@ -134,7 +134,7 @@ def read(path: str | Path, product: str) -> xr.Dataset:
     path
         The file.
     product
-        A key of `variables.PRODUCTS`.
+        A key of `variables.PRODUCTS`; by default whatever the file says that it holds.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def read(path: str | Path, product: str) -> xr.Dataset:
     """
     import xarray as xr
 
-    remedy = "delete it and run again, and it will be made anew"
+    remedy = "delete it and run again, and it will be made again"
     path = Path(path)
     if not path.is_file():
         raise ValueError(f"{path} does not exist; run the study that makes it")
@@ -159,8 +159,11 @@ def read(path: str | Path, product: str) -> xr.Dataset:
     except (OSError, RuntimeError, ValueError) as error:
         raise ValueError(f"{path} is truncated or not netCDF ({error}); {remedy}") from error
     found = stored.attrs.get("vinsar_product", "no vinsar product")
-    if found != product:
-        raise ValueError(f"{path} holds {found}, not '{product}'; {remedy}")
+    if product is None and found in variables.PRODUCTS:
+        product = found
+    if product is None or found != product:
+        wanted = f"'{product}'" if product else "a product of this version"
+        raise ValueError(f"{path} holds {found}, not {wanted}; {remedy}")
     try:
         data = _restore(stored, product)
         variables.check(data, product)

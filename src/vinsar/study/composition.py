@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import create_model
 
-import vinsar
 from vinsar.foundations import configuration
 from vinsar.foundations.configuration import Section, key
 from vinsar.study import options
@@ -27,7 +26,7 @@ _WINGS = ("radar", "simulation", "processing", "evaluation")
 def _modules() -> list[ModuleType]:
     found: list[ModuleType] = []
     for wing in _WINGS:
-        package = importlib.import_module(f"{vinsar.__name__}.{wing}")
+        package = importlib.import_module(f"vinsar.{wing}")
         found += [
             importlib.import_module(f"{package.__name__}.{module.name}")
             for module in pkgutil.iter_modules(package.__path__)

@@ -480,14 +480,18 @@ def _run_block(given: Given, block: list[Case]) -> Results:
     return rows, errors
 
 
+def _nothing(*_: object) -> None:
+    pass
+
+
 def run(
     study: Study,
     name: str,
     *,
-    finished: Mapping[str, Row],
-    keep: Callable[[dict[str, Row]], None],
-    progress: Callable[[int, int], None],
     compute: Compute,
+    finished: Mapping[str, Row] | None = None,
+    keep: Callable[[dict[str, Row]], object] | None = None,
+    progress: Callable[[int, int], object] | None = None,
     given: Mapping[str, xr.Dataset] | None = None,
 ) -> xr.Dataset:
     """Run a sweep.
@@ -498,17 +502,17 @@ def run(
         The study that the sweep belongs to.
     name
         Name of the sweep.
+    compute
+        ``compute(function, blocks, receive, lost)`` runs the function on each block of cases, in
+        parallel, and calls, in this thread and in any order, ``receive`` with what it returns, or
+        ``lost`` with a block that could not be run and a sentence that says why
+        (`cluster.workers`).
     finished
         Rows of an earlier run, by the cases' keys; they are not computed again.
     keep
         Called with each block's rows as it finishes, in whatever order.
     progress
         Called with the number of finished cases and of all.
-    compute
-        ``compute(function, blocks, receive, lost)`` runs the function on each block of cases, in
-        parallel, and calls, in this thread and in any order, ``receive`` with what it returns, or
-        ``lost`` with a block that could not be run and a sentence that says why
-        (`cluster.workers`).
     given
         Products from files of the user's own, which all cases share.
 
@@ -526,6 +530,7 @@ def run(
     """
     known = {label: (data, _fingerprint(data)) for label, data in (given or {}).items()}
     everything = cases(study, name, *(print_ for _, print_ in known.values()))
+    finished, keep, progress = finished or {}, keep or _nothing, progress or _nothing
     rows = {case.key: finished[case.key] for case in everything if case.key in finished}
     waiting = [case for case in everything if case.key not in rows]
     logger.info("%d of %d cases are finished", len(rows), len(everything))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,8 @@ FORMATS = ("pdf", "svg", "png")
 
 # Only what Matplotlib draws as pixels inside a vector file: the shaded surface.
 _RASTER_DPI = 300
+
+_INLINE_DPI = 150
 
 
 def save(
@@ -68,6 +71,20 @@ def save(
                     facecolor="white",
                     metadata=_metadata(kind, metadata or {}),
                 )
+
+
+def shown_inline(figure: Figure) -> Figure:
+    """Return a figure that a notebook shows as what a cell returns, whatever its backend."""
+
+    def png() -> bytes:
+        buffer = io.BytesIO()
+        with style.applied(style.options_of(figure)):
+            figure.savefig(buffer, format="png", dpi=_INLINE_DPI, facecolor="white")
+        return buffer.getvalue()
+
+    # IPython's protocol, which objects of foreign classes take part in by attribute.
+    figure._repr_png_ = png  # type: ignore[attr-defined]
+    return figure
 
 
 def _metadata(kind: str, metadata: Mapping[str, str]) -> dict[str, Any]:
