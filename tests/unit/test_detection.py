@@ -162,13 +162,13 @@ def test_the_plane_does_not_bend_under_objects_and_the_median_follows_rolling_gr
 def test_the_running_median_is_the_median_of_its_window():
     values = np.random.default_rng(3).normal(size=(40, 30))
     values[values > 1.5] = np.nan
-    found = detection.running_median(values, 7)
+    found = detection.running_median(values, (7, 7))
     for row, column in ((0, 0), (20, 11), (39, 29), (5, 28)):
         part = values[max(0, row - 3) : row + 4, max(0, column - 3) : column + 4]
         assert found[row, column] == np.nanmedian(part)
     empty = values.copy()
     empty[:20, :15] = np.nan
-    assert detection.running_median(empty, 7)[3, 3] == np.nanmedian(empty)
+    assert detection.running_median(empty, (7, 7))[3, 3] == np.nanmedian(empty)
 
 
 def test_regions_are_connected_over_corners_and_large_enough():

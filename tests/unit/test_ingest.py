@@ -179,6 +179,28 @@ def test_a_second_band_called_reflectivity_is_taken_as_such(tmp_path):
     np.testing.assert_allclose(ingest.read(own)["elevation"]["reflectivity"], 0.25, rtol=1e-12)
 
 
+def test_degrees_are_read_at_longitude_and_latitude(tmp_path):
+    step = rasterio.Affine(1e-5, 0, 9.9997, 0, -1e-5, 52.0003)
+    path = geotiff(tmp_path / "degrees.tif", epsg=4326, transform=step)
+    own = own_terrain(
+        path, origin_longitude_deg=10.0, origin_latitude_deg=52.0, ground_height_m=None
+    )
+    found = ingest.read(own)["elevation"]
+    # A pixel of 1e-5 degrees of latitude is 1.11 m, over which the plane rises by 0.02 m.
+    slope = float(found["height"][-1, 0] - found["height"][0, 0]) / 2.0
+    assert slope == pytest.approx(0.02 / 1.1127, rel=1e-3)
+
+
+def test_a_place_has_longitude_and_latitude(tmp_path):
+    with pytest.raises(validation.ConfigurationError, match=r"scene\.origin_latitude_deg"):
+        own_terrain(geotiff(tmp_path / "plane.tif"), origin_longitude_deg=10.0)
+
+
+def test_the_reflectivity_of_one_s_own_terrain_may_be_constant(tmp_path):
+    own = own_terrain(geotiff(tmp_path / "plane.tif"), file_reflectivity="constant", **UTM)
+    assert (ingest.read(own)["elevation"]["reflectivity"] == 0.5).all()
+
+
 @pytest.mark.parametrize(
     ("options", "scene", "sentence"),
     [
@@ -318,7 +340,9 @@ def test_other_apertures_come_back_as_well(tmp_path, sections):
     ingest.export(tmp_path, tmp_path / "echo.nc")
     own = own_echoes(tmp_path / "echo.nc")
     made = pipeline.run(own, only="dem", given=ingest.read(own))
-    xr.testing.assert_identical(made["dem"], products["dem"])
+    # Profiles are cut to the range of the planned positions there, of the recorded ones here, and
+    # their places are rounded to single precision from where they begin: 5e-7 of the image.
+    xr.testing.assert_allclose(made["dem"], products["dem"], rtol=0, atol=1e-4)
 
 
 def test_labels_by_name_by_index_and_none_are_the_same(echo_file, echoes, tmp_path):
@@ -428,6 +452,118 @@ def test_the_image_must_suit_the_measured_radar(echo_file):
     with pytest.raises(ConfigurationError) as caught:
         own_echoes(echo_file, imaging={"y_max_m": 40.0})
     assert [fault.key for fault in caught.value.faults] == ["imaging.y_max_m"]
+
+
+def test_one_antenna_is_told_once(echoes, tmp_path):
+    echoes.to_netcdf(tmp_path / "long.nc")
+    echoes.drop_vars("receiver").to_netcdf(tmp_path / "short.nc")
+    one, two = (ingest.measurement(str(tmp_path / f"{name}.nc")) for name in ("long", "short"))
+    for name in pipeline.MEASURED:
+        xr.testing.assert_identical(one[name], two[name])
+
+
+def test_interleaved_positions_are_put_in_order(echoes, tmp_path):
+    count = echoes.sizes["position"]
+    order = np.concatenate([np.arange(0, count, 2), np.arange(1, count, 2)])
+    echoes.to_netcdf(tmp_path / "straight.nc")
+    echoes.isel(position=order).drop_vars("position", errors="ignore").to_netcdf(
+        tmp_path / "interleaved.nc"
+    )
+    studies = [own_echoes(tmp_path / f"{name}.nc") for name in ("straight", "interleaved")]
+    # The whole chain, with a weighting that goes by the positions' number.
+    one, two = (
+        pipeline.run(
+            own.model_copy(
+                update={"imaging": own.imaging.model_copy(update={"aperture_window": "hann"})}
+            ),
+            only="dem",
+            given=ingest.read(own),
+        )["dem"]
+        for own in studies
+    )
+    xr.testing.assert_identical(one, two)
+
+
+def turned(data):
+    """Turn the antennas by a right angle: the rail lies along y, but for three centimetres."""
+    swapped = data.copy(deep=True)
+    for name in ("transmitter", "receiver"):
+        places = data[name].values
+        jitter = 0.03 * np.cos(np.arange(places.shape[1]))
+        swapped[name][..., 0], swapped[name][..., 1] = jitter, places[..., 0]
+    return swapped
+
+
+def test_a_rail_along_y_is_refused_whatever_its_jitter(echoes, tmp_path):
+    turned(echoes).to_netcdf(tmp_path / "turned.nc")
+    sentence = said(tmp_path / "turned.nc", lambda: own_echoes(tmp_path / "turned.nc"))
+    assert "m along y, so they do not move along x" in sentence
+
+
+def point_echoes(path, target, *, center, extent, positions, frequency):
+    """Write the echo of a point target as two channels of one radar see it."""
+    x = np.linspace(-extent / 2, extent / 2, positions)
+    places = np.stack(
+        [np.stack([x, 0 * x, 0 * x + center + up], axis=-1) for up in (0.0, center / 20)]
+    )
+    paths = np.linalg.norm(places - target, axis=-1)[..., None]
+    echo = np.exp(-4j * np.pi * (frequency * paths / 299_792_458.0 % 1))
+    samples, dims = ("channel", "position", "frequency"), ("channel", "position", "axis")
+    xr.Dataset(
+        {
+            "echo_real": (samples, echo.real),
+            "echo_imag": (samples, echo.imag),
+            "transmitter": (dims, places, {"units": "m"}),
+        },
+        {"frequency": ("frequency", frequency, {"units": "Hz"})},
+    ).to_netcdf(path)
+    return places, echo
+
+
+@pytest.mark.parametrize(
+    ("radar", "imaging"),
+    [
+        # Nearer than the margin that profiles have elsewhere, 0.5 m, in 1.5 m of range.
+        (
+            {"center": 0.2, "extent": 0.3, "positions": 61,
+             "frequency": np.linspace(22e9, 26e9, 41)},
+            {"x": 0.4, "y_min_m": 0.4, "y_max_m": 1.2, "grid_spacing_m": 0.02},
+        ),
+        # A hundred times the unambiguous range away.
+        (
+            {"center": 40.0, "extent": 60.0, "positions": 121,
+             "frequency": np.linspace(9.3e9, 9.9e9, 401)},
+            {"x": 20.0, "y_min_m": 9980.0, "y_max_m": 10020.0, "grid_spacing_m": 2.0,
+             "grid_spacing_y_m": 0.25},
+        ),
+    ],
+)  # fmt: skip
+def test_near_and_far_scenes_are_the_direct_sum(tmp_path, radar, imaging):
+    half = imaging.pop("x")
+    middle = (imaging["y_min_m"] + imaging["y_max_m"]) / 2
+    places, echo = point_echoes(tmp_path / "point.nc", np.array([0.0, middle, 0.0]), **radar)
+    own = own_echoes(
+        tmp_path / "point.nc",
+        imaging={"x_min_m": -half, "x_max_m": half, "interpolation": "cubic"} | imaging,
+        height={"level_ground": [{"x_min_m": -half, "x_max_m": 0.0, "y_min_m": imaging["y_min_m"],
+                                  "y_max_m": middle}]},
+        registration={"near": {"x_m": 0.0, "y_m": 2 * middle},
+                      "far": {"x_m": 0.0, "y_m": 3 * middle},
+                      "height_min_m": -0.01, "height_max_m": 0.01},
+    )  # fmt: skip
+    image = pipeline.run(own, only="images", given=ingest.read(own))["images"]
+    frequency = radar["frequency"]
+    x, y = (image[axis].values[::5] for axis in "xy")
+    pixels = np.stack([*np.meshgrid(x, y), np.zeros((y.size, x.size))], axis=-1)
+    expected = np.zeros((y.size, x.size), complex)
+    for place, one in zip(places[0], echo[0], strict=True):
+        ranges = np.linalg.norm(pixels - place, axis=-1)[..., None]
+        turn = np.exp(4j * np.pi * (frequency * ranges / 299_792_458.0 % 1))
+        expected += (one * turn).mean(axis=-1) / len(places[0])
+    found = image["image"].values[0, ::5, ::5]
+    assert np.abs(expected).max() == pytest.approx(1, abs=1e-6)
+    # Single precision of the profiles and their cubic interpolation: below -80 dB.
+    assert np.abs(found - expected).max() < 1e-4
 
 
 def test_what_a_file_gives_must_be_given(terrain_file, echo_file):

@@ -115,7 +115,7 @@ def test_the_paper_is_wise():
         ({"radar__frequency_count": 101}, "scene.y_max_m", "unambiguous range, 7.49 m"),
         ({"scene__facet_size_m": 0.05}, "scene.facet_size_m", "half a resolution cell"),
         ({"radar__position_spacing_m": 0.04}, "radar.position_spacing_m", "ambiguously"),
-        ({"imaging__grid_spacing_m": 0.1}, "imaging.grid_spacing_m", "at most the resolution"),
+        ({"imaging__grid_spacing_y_m": 0.7}, "imaging.grid_spacing_y_m", "must divide the extent"),
         ({"interferogram__coherence_window_px": 4}, "interferogram.coherence_window_px", "odd"),
         ({"filtering__goldstein_step_px": 24}, "filtering.goldstein_step_px", "1, 2, 4, 8, 16, 32"),
         ({"registration__height_max_m": -1.0}, "registration.height_max_m", "must exceed"),
@@ -175,6 +175,10 @@ def test_the_advised_frequency_count_suffices():
         ({"radar__baseline_m": 2.5}, "quarter of the critical baseline, 1.821 m"),
         ({"scene__facet_size_m": 0.02}, "below the wavelength, 0.0214 m"),
         ({"imaging__y_max_m": 17.0}, "beyond the scene"),
+        # At x = 0: lambda r / 2L at y = 10 m, c r / 2W y at y = 16 m; a sinc falls by 3 dB within
+        # 0.886 of that.
+        ({"imaging__grid_spacing_x_m": 0.125}, "-3 dB width in x where it is least, 0.1209 m"),
+        ({"imaging__grid_spacing_y_m": 0.08}, "-3 dB width in y where it is least, 0.0669 m"),
     ],
 )
 def test_what_is_unwise_is_said_and_allowed(change, says):

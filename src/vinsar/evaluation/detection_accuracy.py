@@ -10,7 +10,7 @@ import numpy as np
 from vinsar.foundations import tables, variables
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing.detection import FREE, UNKNOWN, regions
+from vinsar.processing.detection import FREE, UNKNOWN, pixel_area, regions, spacings
 from vinsar.simulation import scene
 
 if TYPE_CHECKING:
@@ -130,12 +130,14 @@ def evaluate(
         Product ``detection_accuracy``.
     """
     x, y = detections["x"].values, detections["y"].values
-    spacing = float(x[1] - x[0])
     footprints = [_footprint(part, x, y) for part in objects]
-    reach = int(np.ceil(options.multilook_window_m / spacing - 1e-6))
+    reach = [
+        int(np.ceil(options.multilook_window_m / spacing - 1e-6))
+        for spacing in spacings(x, y)[::-1]
+    ]
     grown = [_grow(mask, reach) for mask in footprints]
     anywhere = np.any([np.zeros((y.size, x.size), bool), *grown], axis=0)
-    least = options.minimum_area_m2 / spacing**2
+    least = options.minimum_area_m2 / pixel_area(x, y)
     signs = [1 if part.shape in {"box", "stump", "mound"} else -1 for part in objects]
 
     def count(masks: dict[int, Flags]) -> tuple[list[bool], int]:
@@ -168,7 +170,7 @@ def evaluate(
             "object_free": np.array([_share(kind == FREE, mask) for mask in footprints]),
             "shadow_unknown": _share(kind == UNKNOWN, shadow),
             "visible_unknown": _share(kind == UNKNOWN, exists & ~shadow & ~anywhere),
-            "scene_area": exists.sum() * spacing**2,
+            "scene_area": exists.sum() * pixel_area(x, y),
         },
         {"height_threshold": HEIGHT_THRESHOLDS, "amplitude_threshold": AMPLITUDE_THRESHOLDS},
     )
@@ -181,10 +183,10 @@ def _footprint(part: SceneObject, x: Floats, y: Floats) -> Flags:
     return mask
 
 
-def _grow(mask: Flags, cells: int) -> Flags:
+def _grow(mask: Flags, cells: list[int]) -> Flags:
     from scipy.ndimage import binary_dilation
 
-    return np.asarray(binary_dilation(mask, np.ones((2 * cells + 1, 2 * cells + 1), bool)))
+    return np.asarray(binary_dilation(mask, np.ones([2 * count + 1 for count in cells], bool)))
 
 
 def _height(part: SceneObject) -> float:

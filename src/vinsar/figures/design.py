@@ -9,6 +9,7 @@ import numpy as np
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
+from vinsar.radar import grid
 from vinsar.study.composition import StudyModel
 
 if TYPE_CHECKING:
@@ -71,9 +72,8 @@ def _resolutions(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
     across, ahead = 100 * sheet.instrument.resolution(sheet.x, y)
     axes.plot(y, across, color=style.BLUE, label="along x (the rail)")
     axes.plot(y, ahead, color=style.ORANGE, linestyle=style.DASHED, label="along y (ahead)")
-    axes.axhline(
-        100 * sheet.study.imaging.grid_spacing_m, color=style.GREY, linestyle=":", label="pixel"
-    )
+    side = grid.pixel_side(sheet.study.imaging)
+    axes.axhline(100 * side, color=style.GREY, linestyle=":", label="pixel")
     axes.set_ylim(0, 1.45 * max(across.max(), ahead.max()))
     axes.yaxis.set_major_locator(style.round_ticks(6))
     axes.set_ylabel("resolution (cm)")

@@ -17,7 +17,7 @@ import numpy as np
 from vinsar.foundations import tables
 from vinsar.foundations.constants import AXES
 from vinsar.processing import filtering
-from vinsar.radar import aperture, instrument, speckle, trajectory
+from vinsar.radar import aperture, grid, instrument, speckle, trajectory
 from vinsar.radar.instrument import Instrument
 from vinsar.study import validation
 
@@ -108,7 +108,7 @@ def filter_looks(
     looks = np.empty(y.shape)
     share = filtering.shifted_share(coherence, planned.geometric_coherence(x, y))
     for row in np.unique(y):
-        across, ahead = planned.resolution(x, row) / imaging.grid_spacing_m
+        across, ahead = planned.resolution(x, row) / np.array(grid.pixel(imaging))
         looks[y == row] = filtering.effective_looks(
             coherence[y == row],
             (float(ahead), float(across)),
@@ -670,12 +670,13 @@ class Sheet:
                 f"{width:g} m wide and {widths.min():.2f} m are imaged once: what lies beside it "
                 "folds into it"
             )
-        cell = float(planned.resolution(self.x, y).min())
-        if self.study.imaging.grid_spacing_m > cell / 2:
-            found.append(
-                f"imaging.grid_spacing_m = {self.study.imaging.grid_spacing_m}: above half the "
-                f"resolution, {cell / 2:.3f} m: the interferogram is undersampled"
-            )
+        cells = planned.resolution(self.x, y).reshape(2, -1).min(axis=1)
+        for axis, spacing, cell in zip("xy", grid.pixel(self.study.imaging), cells, strict=True):
+            if spacing > cell / 2:
+                found.append(
+                    f"imaging.grid_spacing_m = {spacing}: above half the resolution in {axis}, "
+                    f"{cell / 2:.3f} m: the interferogram is undersampled"
+                )
         sidelobes = self.coupling_db()
         if sidelobes is not None and sidelobes > _SIDELOBES_DB:
             found.append(

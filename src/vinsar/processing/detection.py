@@ -166,12 +166,28 @@ def regions(alarm: Flags, least_cells: float) -> tuple[NDArray[np.integer], int]
     return number[areas], int(kept.sum())
 
 
-def _window(length_m: float, spacing_m: float) -> int:
-    """Return an odd number of pixels of about this length."""
-    return 2 * max(0, round(length_m / spacing_m / 2 - 0.5)) + 1
+def _window(length_m: float, x: Floats, y: Floats) -> tuple[int, int]:
+    """Return odd numbers of rows and columns of about this length."""
+    across, ahead = spacings(x, y)
+    rows, columns = (
+        2 * max(0, round(length_m / spacing / 2 - 0.5)) + 1 for spacing in (ahead, across)
+    )
+    return rows, columns
 
 
-def running_median(values: Floats, window_px: int) -> Floats:
+def spacings(x: Floats, y: Floats) -> tuple[float, float]:
+    """Return the spacing of pixels in x and y, m; of square ones the same number twice."""
+    across, ahead = float(x[1] - x[0]), float(y[1] - y[0])
+    return across, across if abs(ahead - across) < 1e-9 else ahead
+
+
+def pixel_area(x: Floats, y: Floats) -> float:
+    """Return the area of a pixel, m^2."""
+    across, ahead = spacings(x, y)
+    return across * ahead
+
+
+def running_median(values: Floats, window_px: tuple[int, int]) -> Floats:
     """Return the median around each cell, without the cells that are not a number.
 
     It is taken at a few nodes a window and interpolated between them.
@@ -181,7 +197,7 @@ def running_median(values: Floats, window_px: int) -> Floats:
     values
         Values (y, x).
     window_px
-        Side of the square window; at the edges it covers what there is.
+        Rows and columns of the window; at the edges it covers what there is.
 
     Returns
     -------
@@ -190,19 +206,21 @@ def running_median(values: Floats, window_px: int) -> Floats:
     """
     from scipy.ndimage import map_coordinates
 
-    step = max(1, window_px // _NODES)
-    half = window_px // 2
-    rows, columns = (np.arange(0, size - 1 + step, step) for size in values.shape)
+    steps = [max(1, side // _NODES) for side in window_px]
+    up, across = (side // 2 for side in window_px)
+    rows, columns = (
+        np.arange(0, size - 1 + step, step) for size, step in zip(values.shape, steps, strict=True)
+    )
     medians = np.empty((rows.size, columns.size))
     everywhere = values[np.isfinite(values)]
     default = np.median(everywhere) if everywhere.size else np.nan
     for i, row in enumerate(rows):
-        strip = values[max(0, row - half) : row + half + 1]
+        strip = values[max(0, row - up) : row + up + 1]
         for j, column in enumerate(columns):
-            part = strip[:, max(0, column - half) : column + half + 1]
+            part = strip[:, max(0, column - across) : column + across + 1]
             known = part[np.isfinite(part)]
             medians[i, j] = np.median(known) if known.size else default
-    places = np.indices(values.shape) / step
+    places = np.indices(values.shape) / np.reshape(steps, (2, 1, 1))
     return np.asarray(map_coordinates(medians, places, order=1, mode="nearest"))
 
 
@@ -244,7 +262,7 @@ def ground(heights: Floats, x: Floats, y: Floats, window_m: float | None) -> Flo
     plane = constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0])
     if window_m is None:
         return np.asarray(plane)
-    return np.asarray(plane + running_median(heights - plane, _window(window_m, x[1] - x[0])))
+    return np.asarray(plane + running_median(heights - plane, _window(window_m, x, y)))
 
 
 def _ratio(decibel: float) -> float:
@@ -294,19 +312,18 @@ def detect(
     from scipy.ndimage import uniform_filter
 
     x, y = dem["x"].values, dem["y"].values
-    spacing = float(x[1] - x[0])
     true_x, true_y, height_by_phase = _located(dem, images)
 
     def coded(values: Floats) -> Floats:
         return height.code_dem(np.asarray(values, float), x, y, true_x=true_x, true_y=true_y)
 
-    window = _window(options.multilook_window_m, spacing)
+    window = _window(options.multilook_window_m, x, y)
     power = (np.abs(images["image"].values) ** 2).mean(axis=0)
     intensity = uniform_filter(power, window, mode="nearest")
-    surroundings = running_median(intensity, _window(options.background_window_m, spacing))
+    surroundings = running_median(intensity, _window(options.background_window_m, x, y))
     contrast = intensity / np.maximum(surroundings, np.finfo(float).tiny)
     found = dem["height"].values
-    least = options.minimum_area_m2 / spacing**2
+    least = options.minimum_area_m2 / pixel_area(x, y)
     # Speckle has dark spots of its own.
     shaded, _ = regions(contrast < _ratio(options.shadow_level_db), least)
     dark = ~(coded(np.where(shaded > 0, 1.0, 0.0)) < 0.5) | ~np.isfinite(found)
@@ -350,13 +367,13 @@ def _describe(area: Flags, residual: Floats, x: Floats, y: Floats) -> tuple[floa
     row, column = np.nonzero(area)
     values = residual[area]
     sign = 1.0 if values[0] > 0 else -1.0
-    spacing = float(x[1] - x[0])
+    across, ahead = spacings(x, y)
     return (
         float(x[column].mean()),
         float(y[row].mean()),
-        float(np.ptp(x[column])) + spacing,
-        float(np.ptp(y[row])) + spacing,
-        row.size * spacing**2,
+        float(np.ptp(x[column])) + across,
+        float(np.ptp(y[row])) + ahead,
+        row.size * pixel_area(x, y),
         sign * float(np.percentile(sign * values, _PERCENTILE)),
     )
 

@@ -78,6 +78,12 @@ class Imaging(Section, name="imaging"):
     y_min_m: float = key("near edge of the image", "section 2")
     y_max_m: float = key("far edge of the image", "section 2")
     grid_spacing_m: float = key("pixel spacing of image and DEM", "not given", gt=0)
+    grid_spacing_x_m: float | None = key(
+        "pixel spacing in x, if it is not that of y; null for grid_spacing_m", "not given", gt=0
+    )
+    grid_spacing_y_m: float | None = key(
+        "pixel spacing in y, if it is not that of x; null for grid_spacing_m", "not given", gt=0
+    )
     range_window: Literal["rectangular", "hann", "hamming", "blackman"] = key(
         "weighting of the frequencies", "not mentioned"
     )
@@ -339,10 +345,14 @@ def _profiles(products: Products, study: Study) -> xr.Dataset:
         duration_s=study.vehicle.scan_duration_s,
     )
     near, far = trajectory.range_extent(antennas, *grid.image_axes(study.imaging))
+    frequency = products["received"]["frequency"].values
+    step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
+    # Of ranges that repeat, none is needed twice.
+    margin = min(_PROFILE_MARGIN_M, 0.49 * (waveform.unambiguous_range(step) - far + near))
     return compress(
         leakage.suppress(products["received"], **study.suppression.model_dump()),
-        near_range_m=max(0.0, near - _PROFILE_MARGIN_M),
-        far_range_m=far + _PROFILE_MARGIN_M,
+        near_range_m=max(0.0, near - margin),
+        far_range_m=far + margin,
         window=study.imaging.range_window,
         oversampling=study.imaging.oversampling,
         interpolation=study.imaging.interpolation,
@@ -365,11 +375,11 @@ def _image_grid(imaging: Imaging) -> Iterator[Fault]:
     yield from faults
     if faults:
         return
-    for axis in "xy":
+    for axis, spacing in zip("xy", grid.pixel(imaging), strict=True):
         low, high = getattr(imaging, f"{axis}_min_m"), getattr(imaging, f"{axis}_max_m")
-        yield from grid.check_multiple(
-            "imaging.grid_spacing_m", imaging.grid_spacing_m, low, high, imaging.grid_spacing_m
-        )
+        own = f"grid_spacing_{axis}_m"
+        key_ = "grid_spacing_m" if getattr(imaging, own) is None else own
+        yield from grid.check_multiple(f"imaging.{key_}", spacing, low, high, spacing)
 
 
 STAGES = {

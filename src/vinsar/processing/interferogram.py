@@ -125,7 +125,7 @@ def looks(antennas: xr.Dataset, study: Study) -> float:
         (y[0] + y[-1]) / 2,
         frequency=waveform.sampled(study.radar),
     )
-    side = study.interferogram.coherence_window_px * study.imaging.grid_spacing_m
+    side = study.interferogram.coherence_window_px * grid.pixel_side(study.imaging)
     return max(1.0, float(side**2 / (cell[0] * cell[1])))
 
 

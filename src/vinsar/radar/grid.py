@@ -22,8 +22,37 @@ KEYS = (
     "imaging.y_min_m",
     "imaging.y_max_m",
     "imaging.grid_spacing_m",
+    "imaging.grid_spacing_x_m",
+    "imaging.grid_spacing_y_m",
 )
 """Keys of the configuration that give the grid of image and DEM."""
+
+
+def pixel(imaging: Any) -> tuple[float, float]:
+    """Return the spacing of pixels in x and y, m.
+
+    Parameters
+    ----------
+    imaging
+        Section ``imaging``.
+    """
+    x, y = imaging.grid_spacing_x_m, imaging.grid_spacing_y_m
+    return (
+        imaging.grid_spacing_m if x is None else x,
+        imaging.grid_spacing_m if y is None else y,
+    )
+
+
+def pixel_side(imaging: Any) -> float:
+    """Return the side of the square that is as large as a pixel, m.
+
+    Parameters
+    ----------
+    imaging
+        Section ``imaging``.
+    """
+    x, y = pixel(imaging)
+    return x if x == y else float(np.sqrt(x * y))
 
 
 def image_axes(imaging: Any) -> tuple[Floats, Floats]:
@@ -34,9 +63,10 @@ def image_axes(imaging: Any) -> tuple[Floats, Floats]:
     imaging
         Section ``imaging``.
     """
+    x, y = pixel(imaging)
     return (
-        geometry.grid_axis(imaging.x_min_m, imaging.x_max_m, imaging.grid_spacing_m),
-        geometry.grid_axis(imaging.y_min_m, imaging.y_max_m, imaging.grid_spacing_m),
+        geometry.grid_axis(imaging.x_min_m, imaging.x_max_m, x),
+        geometry.grid_axis(imaging.y_min_m, imaging.y_max_m, y),
     )
 
 

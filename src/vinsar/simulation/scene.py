@@ -519,14 +519,28 @@ class Scene(Section, name="scene"):
         "shape of the terrain; `file` is your own (docs/own-data.md)", "section 2"
     )
     file: str | None = key(
-        "netCDF or GeoTIFF file with the heights of the terrain `file`; paths begin in the "
+        "netCDF file or raster with the heights of the terrain `file`; paths begin in the "
         "repository's folder",
         "ours",
     )
     origin_easting_m: float = key("easting (x) of the vehicle in the file", "ours")
     origin_northing_m: float = key("northing (y) of the vehicle in the file", "ours")
+    origin_longitude_deg: float | None = key(
+        "longitude of the vehicle on WGS 84, which files in degrees need; with its latitude it "
+        "takes the place of easting and northing",
+        "ours",
+        ge=-180,
+        le=360,
+    )
+    origin_latitude_deg: float | None = key(
+        "latitude of the vehicle on WGS 84", "ours", ge=-90, le=90
+    )
     heading_deg: float = key(
-        "direction ahead, clockwise from the file's y axis (grid north)", "ours", ge=-360, le=360
+        "direction ahead, clockwise from the file's y axis (grid north; true north if the file is "
+        "in degrees)",
+        "ours",
+        ge=-360,
+        le=360,
     )
     ground_height_m: float | None = key(
         "height in the file that becomes 0, the ground plane; null for the file's own height at "
@@ -551,6 +565,11 @@ class Scene(Section, name="scene"):
     reflectivity_offset: float = key(
         "reflectivity is the height in metres plus this", "section 2", gt=0
     )
+    file_reflectivity: Literal["height", "constant"] = key(
+        "of a file without reflectivity: the height plus reflectivity_offset, as in the paper, or "
+        "reflectivity_offset everywhere",
+        "ours",
+    )
     roughness_std_m: float = key(
         "standard deviation of the random roughness of the ground; 0 for none", "ours", ge=0
     )
@@ -570,6 +589,8 @@ ELEVATION = (
     "file",
     "origin_easting_m",
     "origin_northing_m",
+    "origin_longitude_deg",
+    "origin_latitude_deg",
     "heading_deg",
     "ground_height_m",
     "x_min_m",
@@ -578,6 +599,7 @@ ELEVATION = (
     "y_max_m",
     "terrain_spacing_m",
     "reflectivity_offset",
+    "file_reflectivity",
 )
 """Keys of `Scene` that decide what is read from the file of a terrain."""
 
@@ -699,6 +721,10 @@ def _own_terrain(scene: Scene) -> Iterator[Fault]:
             scene.file,
             f"is not read for scene.terrain '{scene.terrain}'; take scene.terrain file, or null",
         )
+    place = scene.origin_longitude_deg, scene.origin_latitude_deg
+    if (place[0] is None) != (place[1] is None):
+        missing = "longitude" if place[0] is None else "latitude"
+        yield Fault(f"scene.origin_{missing}_deg", None, "must be given as well: a place has both")
 
 
 STAGES = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.foundations.errors import Fault
-from vinsar.radar import aperture, baseline, motion, trajectory, waveform
+from vinsar.radar import aperture, baseline, grid, motion, trajectory, waveform
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -179,24 +179,35 @@ def _facets_fine(radar: Radar, scene: Scene) -> Iterator[Fault]:
 
 
 def _grid_fine(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
-    cell = _cell(radar, imaging)
-    if imaging.grid_spacing_m > cell:
-        yield Fault(
-            "imaging.grid_spacing_m",
-            imaging.grid_spacing_m,
-            f"must be at most the resolution, {cell:.4f} m",
-        )
+    windows = imaging.aperture_window, imaging.range_window
+    pixels = zip("xy", grid.pixel(imaging), _cells(radar, imaging), windows, strict=True)
+    for axis, spacing, cell, window in pixels:
+        width = waveform.window_width(window) * cell
+        if spacing > width:
+            own = f"grid_spacing_{axis}_m"
+            key = "grid_spacing_m" if getattr(imaging, own) is None else own
+            yield Fault(
+                f"imaging.{key}",
+                spacing,
+                f"is wider than a point target's -3 dB width in {axis} where it is least, "
+                f"{width:.4f} m: targets are missed between pixels, and phases undersampled",
+            )
 
 
-def _cell(radar_: Radar, part: Scene | Imaging) -> float:
+def _cell(radar: Radar, part: Scene | Imaging) -> float:
     """Return the finest resolution in a part of the ground, m."""
+    return float(_cells(radar, part).min())
+
+
+def _cells(radar_: Radar, part: Scene | Imaging) -> Any:
+    """Return the finest resolution in x and in y in a part of the ground, m."""
     derived = _Derived.of(radar_)
     x = np.clip(0.0, part.x_min_m, part.x_max_m)
     cells = [
         waveform.ground_resolution(derived.apertures[0], x, y, frequency=derived.frequency)
         for y in (part.y_min_m, part.y_max_m)
     ]  # fmt: skip
-    return float(np.min(cells))
+    return np.min(cells, axis=0)
 
 
 def _widest_spacing(radar: Radar, scene: Scene) -> float:
@@ -381,7 +392,6 @@ CHECKS = (
         _drives_short,
         _unambiguous,
         _facets_fine,
-        _grid_fine,
         _positions_dense,
         _driven_densely,
         _gate_before_image,
@@ -395,6 +405,7 @@ ADVICE = (
     _baseline_short,
     _elements_dense,
     _facets_coarse,
+    _grid_fine,
     _coupling_in_gate,
     _image_in_scene,
     _sides_apart,

@@ -47,6 +47,10 @@ _HERTZ = ("Hz", "hertz", "Hertz", "s-1", "1/s")
 # 6 mrad at the far end of the unambiguous range.
 _UNEVEN = 1e-3
 
+# Positions whose number is correlated with their x by less than this are not in order; of a cart
+# that is pushed in jerks it is 0.95 and more.
+_ORDERED = 0.9
+
 # The rules of the configuration see the antennas above the origin.
 _OFF_ORIGIN_M = 1.0
 
@@ -158,6 +162,7 @@ def elevation(options: Scene, *, antenna_height_m: float) -> xr.Dataset:
             x,
             y,
             origin_m=(options.origin_easting_m, options.origin_northing_m),
+            longitude_latitude_deg=_place(options),
             heading_deg=options.heading_deg,
             ground_height_m=options.ground_height_m,
         )
@@ -165,7 +170,7 @@ def elevation(options: Scene, *, antenna_height_m: float) -> xr.Dataset:
             x,
             y,
             found.height,
-            found.reflectivity,
+            _reflectivity(found, options),
             reflectivity_offset=options.reflectivity_offset,
         )
         top = float(product["height"].max())
@@ -181,6 +186,17 @@ def elevation(options: Scene, *, antenna_height_m: float) -> xr.Dataset:
     for sentence in found.warnings:
         logger.warning("%s: %s", path, sentence)
     return product
+
+
+def _place(options: Scene) -> tuple[float, float] | None:
+    longitude, latitude = options.origin_longitude_deg, options.origin_latitude_deg
+    return None if longitude is None or latitude is None else (longitude, latitude)
+
+
+def _reflectivity(found: surveyed.Elevation, options: Scene) -> Floats | None:
+    if found.reflectivity is None and options.file_reflectivity == "constant":
+        return np.full(found.height.shape, options.reflectivity_offset)
+    return found.reflectivity
 
 
 def measurement(path: str) -> dict[str, xr.Dataset]:
@@ -202,15 +218,17 @@ def measurement(path: str) -> dict[str, xr.Dataset]:
         If anything is wrong with the file, with the file's name and what to change.
     """
     with _blaming("measurement.file", path), _netcdf(path) as stored:
-        frequency, (transmitter, receiver) = _waveform(stored)
-        parts = [_samples(_by_name(stored), f"echo_{part}") for part in ("real", "imag")]
+        frequency, antennas = _waveform(stored)
+        parts = [_samples(_arranged(stored), f"echo_{part}") for part in ("real", "imag")]
     echo = np.empty(parts[0].shape, np.result_type(*parts, np.complex64))
     echo.real, echo.imag = parts
-    antennas = variables.dataset("trajectory", {"transmitter": transmitter, "receiver": receiver})
+    echo, *ends = _in_order(echo, *antennas)
+    ends_ = dict(zip(("transmitter", "receiver"), ends, strict=True))
+    trajectory_ = variables.dataset("trajectory", ends_)
     return {
         "received": variables.dataset("received", {"echo": echo}, {"frequency": frequency}),
-        "trajectory": antennas,
-        "recorded_trajectory": antennas,
+        "trajectory": trajectory_,
+        "recorded_trajectory": trajectory_,
     }
 
 
@@ -283,9 +301,29 @@ def _by_name(stored: xr.Dataset) -> xr.Dataset:
     return stored
 
 
+def _arranged(stored: xr.Dataset) -> xr.Dataset:
+    """Return a file with all that its short forms leave out.
+
+    One channel needs no dimension of it, channels that share their positions neither, and an
+    antenna that does both is told once.
+    """
+    stored = _by_name(stored)
+    if "transmitter" in stored.variables and "receiver" not in stored.variables:
+        stored = stored.assign(receiver=stored["transmitter"])
+    count = stored.sizes.get("channel", 1)
+    for name in ("echo_real", "echo_imag", "transmitter", "receiver"):
+        # Labels would be expected of what is spread over them.
+        if name in stored.variables and "channel" not in stored[name].dims:
+            spread = stored[name].expand_dims({"channel": count})
+            if "channel" in stored.coords and "channel" in stored.dims:
+                spread = spread.assign_coords(channel=stored["channel"])
+            stored = stored.assign({name: spread})
+    return stored
+
+
 def _waveform(stored: xr.Dataset) -> tuple[Floats, Antennas]:
     """Return frequencies and antenna positions, checked by themselves."""
-    stored = _by_name(stored)
+    stored = _arranged(stored)
     for part in ("real", "imag"):
         _declared(stored, f"echo_{part}", ("channel", "position", "frequency"), ())
     for name, labels in (("channel", CHANNELS), ("axis", AXES)):
@@ -302,48 +340,87 @@ def _waveform(stored: xr.Dataset) -> tuple[Floats, Antennas]:
         raise ValueError("variable 'frequency' falls; sort it and the echo by rising frequency")
     if frequency[0] <= 0:
         raise ValueError(f"variable 'frequency' begins at {frequency[0]:g} Hz; it must be positive")
-    antennas = tuple(
+    transmitter, receiver = (
         _values(stored, name, ("channel", "position", "axis"), surveyed.METRES)
         for name in ("transmitter", "receiver")
     )
-    for name, places in zip(("transmitter", "receiver"), antennas, strict=True):
+    for name, places in (("transmitter", transmitter), ("receiver", receiver)):
         _refuse_unknown(name, places)
         if places[..., 2].min() <= 0:
             raise ValueError(
                 f"variable '{name}' has an antenna at z = {places[..., 2].min():g} m, below the "
                 "ground plane z = 0; give heights above ground, z up"
             )
-    transmitter, receiver = antennas
-    middle = (transmitter + receiver).mean(axis=1) / 2
+    _refuse_misaligned((transmitter + receiver) / 2)
+    return frequency, (transmitter, receiver)
+
+
+def _refuse_misaligned(center: Floats) -> None:
+    """Refuse antennas (channel, position, axis) that are no aperture along x above the origin."""
+    middle = center.mean(axis=1)
     if np.hypot(*middle[0, :2]) > _OFF_ORIGIN_M:
         raise ValueError(
             f"the lower channel's antennas are centred on x = {middle[0, 0]:.3f} m, "
             f"y = {middle[0, 1]:.3f} m; shift the coordinates so that the origin lies below their "
-            "centre, with x along the aperture and y ahead"
+            "centre, with x along the aperture and y ahead (./run import --look-at)"
         )
-    if np.ptp(transmitter[..., 0] + receiver[..., 0]) == 0:
-        raise ValueError("the antennas do not move along x, so there is no aperture to focus")
-    if np.hypot(*(middle[1] - middle[0])[1:]) == 0:
-        raise ValueError("both channels stand at the same place; without a baseline no height")
-    if middle[1, 2] < middle[0, 2]:
-        raise ValueError("channel 'lower' is above channel 'upper'; exchange them, echoes as well")
-    return frequency, (transmitter, receiver)
+    for places in center:
+        away = places - places.mean(axis=0)
+        if not away.any():
+            raise ValueError("the antennas do not move along x, so there is no aperture to focus")
+        # Of the middle half of them, so that one that is astray says nothing.
+        x, y, z = np.subtract(*np.percentile(away, [75, 25], axis=0))
+        if x < max(y, z):
+            raise ValueError(
+                f"the antennas are spread over {np.ptp(away[:, 0]):.3g} m along x and over "
+                f"{np.ptp(away[:, 1]):.3g} m along y, so they do not move along x; turn the "
+                "coordinates so that x is along the aperture (./run import --look-at)"
+            )
+    if len(middle) > 1:
+        if np.hypot(*(middle[-1] - middle[0])[1:]) == 0:
+            raise ValueError("both channels stand at the same place; without a baseline no height")
+        if (np.diff(middle[:, 2]) < 0).any():
+            raise ValueError(
+                "channel 'lower' is above channel 'upper'; exchange them, echoes as well"
+            )
+
+
+def _in_order(
+    echo: NDArray[np.complexfloating], transmitter: Floats, receiver: Floats
+) -> tuple[NDArray[np.complexfloating], Floats, Floats]:
+    """Return positions in the order in which they lie along x, if they are interleaved.
+
+    The weighting of positions, and the line that is fitted to them, go by their number.
+    """
+    number = np.arange(echo.shape[1])
+    parts = []
+    for one, out, back in zip(echo, transmitter, receiver, strict=True):
+        x = out[:, 0] + back[:, 0]
+        interleaved = abs(np.corrcoef(number, x)[0, 1]) < _ORDERED
+        order = np.argsort(x, kind="stable") if interleaved else number
+        parts.append((one[order], out[order], back[order]))
+    samples, outs, backs = (np.stack(part) for part in zip(*parts, strict=True))
+    return samples, outs, backs
 
 
 def _radar(frequency: Floats, antennas: Antennas) -> dict[str, Any]:
     """Return the section ``radar`` that describes a measurement."""
     center = (antennas[0] + antennas[1]) / 2
     middle = center.mean(axis=1)
-    across, up = (middle[1] - middle[0])[1:]
     # To the nanometre: the mean of many equal heights is not to the last bit that height.
     aperture = round(float(np.ptp(center[0, :, 0])), 9)
-    return {
+    found = {
         "start_frequency_hz": float(frequency[0]),
         "stop_frequency_hz": float(frequency[-1]),
         "frequency_count": frequency.size,
         "aperture_length_m": aperture,
         "position_spacing_m": aperture / (center.shape[1] - 1),
         "rail_height_m": round(float(middle[0, 2]), 9),
+    }
+    if len(middle) == 1:
+        return found
+    across, up = (middle[-1] - middle[0])[1:]
+    return found | {
         "baseline_m": round(float(np.hypot(across, up)), 9),
         "baseline_angle_deg": round(float(np.rad2deg(np.arctan2(up, across))), 9),
     }
@@ -363,17 +440,23 @@ def _refuse_ambiguous(frequency: Floats, antennas: Antennas, imaging: Imaging) -
     trajectory_ = variables.dataset(
         "trajectory", dict(zip(("transmitter", "receiver"), antennas, strict=True))
     )
-    _, far = trajectory.range_extent(trajectory_, *grid.image_axes(imaging))
+    near, far = trajectory.range_extent(trajectory_, *grid.image_axes(imaging))
     step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
     unambiguous = waveform.unambiguous_range(step)
-    if far > unambiguous:
+    if far - near > unambiguous:
         fault = Fault(
             "imaging.y_max_m",
             imaging.y_max_m,
-            f"its farthest slant range of {far:.2f} m must be within the unambiguous range of the "
-            f"measurement, {unambiguous:.2f} m",
+            f"its slant ranges, {near:.2f} to {far:.2f} m, must span no more than the unambiguous "
+            f"range of the measurement, {unambiguous:.2f} m",
         )
         raise ConfigurationError([fault])
+    if far > unambiguous:
+        logger.warning(
+            "ranges repeat every %.2f m: what is that much nearer or farther than the image, at "
+            "%.2f to %.2f m, lies in it as well, if it is there",
+            unambiguous, near, far,
+        )  # fmt: skip
 
 
 def _declared(
