@@ -539,10 +539,10 @@ FIGURES = {
         draw=draw,
         title="Geometry",
         caption=(
-            "The geometry, drawn to scale from the configuration, with height of ambiguity and "
-            "resolution on the ground below the target: the antennas above the ground plane "
-            "(S1 and S2 on a rail, Tx and Rx of an array), baseline, look angle and slant "
-            "ranges to a target in the scene."
+            "The antennas above the ground plane (S1 and S2 on a rail, Tx and Rx of an array), "
+            "drawn to scale from the configuration, with baseline, look angle and slant ranges "
+            "to a target in the scene; height of ambiguity and resolution are those on the "
+            "ground below the target."
         ),
         sections=("figures", "radar", "scene", "imaging"),
         numbers=numbers,

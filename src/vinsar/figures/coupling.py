@@ -175,10 +175,10 @@ FIGURES = {
         draw=draw,
         title="Coupling of transmitter and receiver",
         caption=(
-            "The coupling of transmitter and receiver: mean power of the range profiles with and "
-            "without it; the spread of the height error on visible ground against its level; and "
-            "the share of a point target's amplitude that its suppression leaves, computed "
-            "(lines) and imaged (marks)."
+            "Mean power of the range profiles with coupling, without it and with its "
+            "suppression; the spread of the height error on visible ground against the level of "
+            "the coupling; and the share of a point target's amplitude that the suppression "
+            "leaves, computed (lines) and imaged (marks)."
         ),
         sections=("figures",),
         inputs=("coupling",),

@@ -163,10 +163,9 @@ FIGURES = {
         draw=draw,
         title="Design sheet",
         caption=(
-            "What the configuration will do, predicted without running it: resolution on the "
-            "ground, height of ambiguity and shadow, height noise by the Cramer-Rao bound for "
-            "the looks of the coherence window, and the noise under white position errors of "
-            "each antenna."
+            "Predicted from the configuration alone: resolution on the ground, height of "
+            "ambiguity and shadow, height noise of level ground for the looks of the phase "
+            "filter, and the noise under white position errors of each antenna."
         ),
         sections=("figures", *design.SECTIONS),
     ),

@@ -244,8 +244,8 @@ FIGURES = {
         draw=draw,
         title="Height error",
         caption=(
-            "Height error, its statistics over the whole scene, visible ground and shadow, and "
-            "its histogram."
+            "Reconstructed minus true height as a map, its statistics over the whole scene, "
+            "visible ground and shadow, and its histogram."
         ),
         sections=("figures",),
         inputs=("accuracy",),

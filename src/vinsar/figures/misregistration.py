@@ -181,10 +181,10 @@ FIGURES = {
         draw=draw,
         title="Misregistration",
         caption=(
-            "Misregistration of a raised target against its height, near and far: Eqs. 6-7 as "
-            "printed, the points of equal path and slope (a circle around a rail's axis, an "
-            "ellipse for an array), and measured on images of point targets. The band is a tenth "
-            "of a resolution cell."
+            "Shift between the images of a raised target against its height, near and far: Eqs. "
+            "6-7 as printed, the points of equal path and slope (a circle around a rail's axis, "
+            "an ellipse for an array), and measured on images of point targets. The band is a "
+            "tenth of a resolution cell."
         ),
         sections=("figures", "radar"),
         inputs=("registration",),

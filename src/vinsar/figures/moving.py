@@ -290,15 +290,15 @@ FIGURES = {
         draw=draw,
         title="A vehicle that drives during the scan",
         caption=(
-            "A vehicle that drives during the scan. (a) Apertures of the slow scan from above, "
-            "at forward speeds in m/s, and where the image lies at half the highest speed of the "
-            "fast scan if imaging is told of no motion. (b, c) A point target at the image's "
-            "centre and the height error on visible ground against the speed, for both scans: "
-            "not corrected, corrected with the true speed, and with that of an erroneous sensor. "
-            "Dotted: amplitude of the target at the place where it is imaged. (d) Height error "
-            "against the sensor's error, with the prediction from the heights of the places that "
-            "the image shows instead; dotted lines mark where it exceeds the error-free one by a "
-            "tenth. Lines are means and bands 10 to 90 % of the realizations."
+            "(a) Apertures of the slow scan from above, at forward speeds in m/s, and where the "
+            "image lies at half the highest speed of the fast scan if imaging is told of no "
+            "motion. (b, c) A point target at the image's centre and the height error on visible "
+            "ground against the speed, for both scans: not corrected, corrected with the true "
+            "speed, and with that of an erroneous sensor. Dotted: amplitude of the target at the "
+            "place where it is imaged. (d) Height error against the sensor's error, with the "
+            "prediction from the heights of the places that the image shows instead; dotted "
+            "lines mark where it exceeds the error-free one by a tenth. Lines are means and "
+            "bands 10 to 90 % of the realizations."
         ),
         sections=("figures", "radar", "imaging", "vehicle"),
         inputs=("terrain", "truth"),

@@ -138,8 +138,8 @@ FIGURES = {
         draw=draw,
         title="Obstacles and holes",
         caption=(
-            "Obstacles and holes on rough ground among bright patches: true height, power of the "
-            "images over its surroundings with the alarms of a detector on it alone, "
+            "Rough ground with obstacles and holes, among bright patches: true height, power of "
+            "the images over its surroundings with the alarms of a detector on it alone, "
             "reconstructed height, and the map that follows from the heights, with unknown "
             "ground."
         ),

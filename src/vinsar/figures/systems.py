@@ -113,9 +113,9 @@ FIGURES = {
         draw=draw,
         title="The rail beside switched arrays",
         caption=(
-            "The rail beside switched arrays: resolution along x and height of ambiguity at "
-            "the scene's middle on the ground, standard deviation of the height error, and "
-            "time for a scan."
+            "Each arrangement of antennas: resolution along x and height of ambiguity at the "
+            "scene's middle on the ground, standard deviation of the height error, and time for "
+            "a scan."
         ),
         sections=("figures", "radar", "scene", "vehicle", "sweeps"),
         sweeps=(systems.SWEEP,),

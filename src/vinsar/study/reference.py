@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
+from vinsar.foundations import tables
 from vinsar.foundations.configuration import models_in
 from vinsar.study.composition import StudyModel
 
@@ -72,16 +73,14 @@ def _section(fields: list[tuple[str, FieldInfo]], defaults: Mapping[str, Any]) -
 
 
 def _table(fields: list[tuple[str, FieldInfo]], defaults: Mapping[str, Any] | None) -> str:
-    value = " paper.yaml |" if defaults is not None else ""
-    rule = "---|" if defaults is not None else ""
-    lines = [f"| key |{value} allowed | meaning | in the paper |", f"|---|{rule}---|---|---|"]
+    rows = []
     for name, field in fields:
         extra = typing.cast("dict[str, Any]", field.json_schema_extra)
-        cell = f" {_value(defaults[name])} |" if defaults is not None else ""
-        lines.append(
-            f"| `{name}` |{cell} {_allowed(field)} | {field.description} | {extra['paper']} |"
-        )
-    return "\n".join(lines) + "\n"
+        value = [] if defaults is None else [_value(defaults[name])]
+        rows.append([f"`{name}`", *value, _allowed(field), field.description or "", extra["paper"]])
+    value = [] if defaults is None else ["paper.yaml"]
+    headings = ["key", *value, "allowed", "meaning", "in the paper"]
+    return tables.write(headings, rows) + "\n"
 
 
 def _value(value: Any) -> str:
