@@ -813,8 +813,8 @@ def as_markdown(sheet: Sheet) -> str:
         "",
         "Position errors, independent by position, 1 sigma, with which 95 % of the heights of "
         f"level ground stay within {most:g} cm: independent by channel, and common to both "
-        "channels, as on a shaking vehicle. Where the relief exceeds the height of ambiguity, common errors do "
-        "as much harm as independent ones:",
+        "channels, as on a shaking vehicle. Where the relief exceeds the height of ambiguity, "
+        "common errors do as much harm as independent ones:",
         "",
     ]
     scatter = [
