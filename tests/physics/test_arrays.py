@@ -85,7 +85,7 @@ def test_minus_3_db_widths_are_those_of_the_paths(focus, scatterers, system, y):
         lower.transmitter, lower.receiver, 0 * lower.receiver_travel,
         LENGTH / 0.8 * lower.receiver_travel,
     )  # fmt: skip
-    across, ahead = waveform.ground_resolution(filled, 0.0, y, frequency=BAND)
+    across, ahead = Instrument(filled, filled, 81, BAND).resolution(0.0, y)
     # One end moves: the cell across is twice that of a rail, lambda r / L.
     slant = float(np.linalg.norm([0, y, lower.receiver[2]]))
     assert across == pytest.approx(WAVELENGTH * slant / LENGTH, rel=1e-2)

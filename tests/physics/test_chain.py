@@ -11,6 +11,7 @@ from scipy.special import spence
 from vinsar.foundations import variables
 from vinsar.processing import filtering, focusing, height, interferogram, unwrapping
 from vinsar.radar import aperture, formulas, geometry, trajectory, waveform
+from vinsar.radar.instrument import Instrument
 from vinsar.simulation import echo, scene, visibility
 
 FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
@@ -83,7 +84,7 @@ def resolution_cells():
     # 81 positions fill 81 steps.
     place, travel = np.array([0.0, 0.0, 2.0]), np.array([0.81, 0.0, 0.0])
     antenna = aperture.Aperture(place, place, travel, travel)
-    along, ahead = waveform.ground_resolution(antenna, 0.0, 10.2, frequency=FREQUENCY)
+    along, ahead = Instrument(antenna, antenna, 81, FREQUENCY).resolution(0.0, 10.2)
     return np.ptp(X) * np.ptp(Y) / (along * ahead)
 
 

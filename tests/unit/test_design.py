@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.special import spence
 
+from vinsar.evaluation import baseline_errors
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
-from vinsar.radar import aperture, baseline, formulas, geometry, trajectory
+from vinsar.radar import aperture, formulas, geometry, trajectory
 from vinsar.study import validation
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -60,12 +61,11 @@ def test_of_a_rail_length_and_attitude_of_the_baseline_are_eqs_5_and_12_with_the
     sheet = sheet_of(radar={"baseline_angle_deg": angle})
     length, attitude, *_ = sheet.offsets()
     for number, y in enumerate(sheet.places):
-        seen = baseline.View(
-            np.array([0.0, 0.0, 2.0]), 0.0, float(y), WAVELENGTH, 0.075, np.deg2rad(angle)
-        )
-        expected = baseline.height_per_length(seen, 0.3, np.deg2rad(angle))
+        antenna = np.array([0.0, 0.0, 2.0])
+        expected = baseline_errors.height_per_length(antenna, float(y), 0.3, np.deg2rad(angle))
         assert length.per_unit[number] / 1e-3 == pytest.approx(float(expected), rel=1e-6)
-        eq12 = formulas.height_per_baseline_angle(seen.slant_range, seen.look)
+        r1, look = (f(antenna, 0.0, y) for f in (geometry.slant_range, geometry.look_angle))
+        eq12 = formulas.height_per_baseline_angle(r1, look)
         assert attitude.per_unit[number] == pytest.approx(np.deg2rad(float(eq12)), rel=1e-6)
 
 

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -6,15 +8,17 @@ from scipy.special import fresnel
 
 from vinsar.foundations import variables
 from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.prediction import design
 from vinsar.processing import focusing
 from vinsar.radar import motion, trajectory, waveform
 from vinsar.simulation import echo
-from vinsar.study import pipeline
+from vinsar.study import pipeline, validation
 from vinsar.study.composition import StudyModel
 
 FREQUENCY = waveform.frequencies(13e9, 15e9, 101)
 WAVELENGTH = waveform.wavelength(waveform.carrier(FREQUENCY))
 POINT = np.array([0.3, 13.0, 0.0])
+CONFIG = Path(__file__).parents[2] / "config"
 
 
 def draw(positions, seed=0, *, std_m=1.0, distribution="normal", spectrum="white", cycles=2.0):
@@ -107,7 +111,7 @@ def errors_of(rail, affected="recorded", seed=1, realization=0, **options):
         {
             "seed": seed, "realization": realization, "motion": section, "vehicle": STANDING,
             "radar.start_frequency_hz": 13e9, "radar.stop_frequency_hz": 15e9,
-            "radar.frequency_count": 101,
+            "radar.frequency_count": 101, "radar.system": "rail",
         }
     )  # fmt: skip
     name = f"{affected}_trajectory"
@@ -282,7 +286,7 @@ def driven(rail, name, section=STILL, realization=0, **options):
         {
             "seed": 1, "realization": realization, "motion": section, "vehicle": SCAN | options,
             "radar.start_frequency_hz": 13e9, "radar.stop_frequency_hz": 15e9,
-            "radar.frequency_count": 101,
+            "radar.frequency_count": 101, "radar.system": "rail",
         }
     )  # fmt: skip
     product = pipeline.STAGES[f"{name}_trajectory"].compute({"trajectory": rail}, study)
@@ -400,3 +404,24 @@ def test_the_margin_of_the_profiles_covers_the_errors_or_says_so(rail):
     assert most > 14 > near
     with pytest.raises(ValueError, match=r"the profiles cover 11.00 to 14.00 m of slant range"):
         focusing.backproject(profiles, far, x=np.array([0.0, 1.0]), y=np.array([11.0, 12.0]))
+
+
+def test_an_array_on_a_moving_vehicle_drives_as_long_as_it_dwells_on_its_samples():
+    study = validation.check(
+        validation.merge(
+            validation.load(CONFIG / "paper.yaml").model_dump(mode="json"),
+            {
+                "radar": {"system": "transmit_pair", "dwell_s": 1e-6},
+                "vehicle": {"forward_speed_m_per_s": 5.0, "scan_duration_s": 0.5},
+                "outputs": {"claims": False},
+                "sweeps": {},
+                "variants": {},
+            },
+        )
+    )
+    still = pipeline.run_stage("trajectory", {}, study)
+    moved = pipeline.run_stage("true_trajectory", {"trajectory": still}, study)
+    way = (moved["receiver"] - still["receiver"]).values[0, :, 1]
+    # Two channels, 81 elements, 401 frequencies, a microsecond each: not the cart's half second.
+    assert np.ptp(way) == pytest.approx(5.0 * 2 * 81 * 401 * 1e-6)
+    assert f"{np.ptp(way):.2f} m in it" in design.as_markdown(design.Sheet(study))

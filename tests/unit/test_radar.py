@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vinsar.radar import aperture, waveform
+from vinsar.radar.instrument import Instrument
 
 WINDOWS = ("rectangular", "hann", "hamming", "blackman")
 LIGHT = 299_792_458.0
@@ -54,24 +55,15 @@ def test_a_stepped_waveform_repeats_after_the_unambiguous_range():
     assert turns[1] == pytest.approx(1)
 
 
-def test_azimuth_resolution_turns_the_phase_along_the_aperture_by_one_cycle():
-    # A target off by the resolution changes the path to the ends of the aperture, out and back,
-    # by a wavelength more at one end than at the other.
-    length, distance, wavelength = 0.8, 1e3, 2e-4
-    cell = float(waveform.azimuth_resolution(wavelength, distance, length))
-    ends = np.array([-length / 2, length / 2])
-    path = 2 * np.hypot(distance, cell - ends)
-    assert path[0] - path[1] == pytest.approx(wavelength, rel=1e-6)
-
-
-def monostatic(length):
+def monostatic(length, frequency):
     place, travel = np.array([0.0, 0.0, 2.0]), np.array([length, 0.0, 0.0])
-    return aperture.Aperture(place, place, travel, travel)
+    antenna = aperture.Aperture(place, place, travel, travel)
+    return Instrument(antenna, antenna, 81, frequency)
 
 
 def test_ground_resolution_straight_ahead_is_that_of_band_and_aperture():
     frequency = waveform.frequencies(13e9, 15e9, 201)
-    along, ahead = waveform.ground_resolution(monostatic(0.8), 0.0, 13.0, frequency=frequency)
+    along, ahead = monostatic(0.8, frequency).resolution(0.0, 13.0)
     slant = np.hypot(13, 2)
     assert along == pytest.approx(LIGHT / 14e9 * slant / 1.6)
     # c / 2W on the slant is longer on the ground by the cosine of the depression.
@@ -82,7 +74,7 @@ def test_ground_resolution_off_the_axis_is_the_slope_of_ranges_and_bearings():
     # Differences of exact ranges: between the aperture's ends over x, and over y.
     frequency = waveform.frequencies(13e9, 15e9, 201)
     position, x, y = np.array([0.0, 0.0, 2.0]), 3.0, 8.0
-    along, ahead = waveform.ground_resolution(monostatic(0.8), x, y, frequency=frequency)
+    along, ahead = monostatic(0.8, frequency).resolution(x, y)
     ends = np.array([[-0.4, 0, 2.0], [0.4, 0, 2.0]])
     step = 1e-5
 

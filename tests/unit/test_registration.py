@@ -11,6 +11,7 @@ from vinsar.evaluation import misregistration
 from vinsar.foundations import variables
 from vinsar.processing import focusing
 from vinsar.radar import trajectory, waveform
+from vinsar.radar.instrument import Instrument
 from vinsar.simulation import echo
 
 FREQUENCY = waveform.frequencies(13e9, 15e9, 201)
@@ -38,14 +39,13 @@ def imager(rail):
 @pytest.fixture(scope="module")
 def analysis(rail, imager):
     return misregistration.analyze(
-        trajectory.apertures(rail),
+        Instrument.of(rail, FREQUENCY),
         imager,
         targets={"near": (3.0, 5.0), "far": (3.0, 15.0)},
         heights=HEIGHTS,
         x=np.linspace(-2.5, 2.5, 11),
         y=np.linspace(10, 16, 13),
         map_height_m=0.3,
-        frequency=FREQUENCY,
     )
 
 

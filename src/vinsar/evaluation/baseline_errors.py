@@ -1,4 +1,13 @@
-"""What errors of the baseline do to the height, by its attitude (section 1.2, Eqs. 5 and 12)."""
+"""What errors of the baseline do to the height, by its attitude (section 1.2, Eqs. 5 and 12).
+
+Eq. 5 is a plane wave's: with ranges as they are, a length error ``dB`` moves the height by
+
+    dh = dB (rho sin(theta) sin(beta - theta) / B + sin(theta)) / cos(beta - theta),
+
+whose second term Eq. 5 lacks. It is one metre a metre for a vertical baseline, and it moves the
+attitude at which a length error does no harm from ``beta = theta`` to
+``beta = theta - asin(B / rho)``.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +20,8 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.randomness import Draw
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.radar import baseline, formulas, geometry
+from vinsar.radar import formulas, geometry, instrument
+from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,9 +93,41 @@ class BaselineErrors(Section, name="baseline_errors"):
     draws: int = key("random draws at each attitude", "ours", ge=2, le=100_000)
 
 
+def height_per_length(
+    antenna: Floats, y_m: float, baseline_m: float, baseline_angle: ArrayLike
+) -> Floats:
+    """Return the exact derivative of the height by the baseline's length, m/m.
+
+    Eq. 5 and the term that it lacks, in the plane across the aperture.
+
+    Parameters
+    ----------
+    antenna
+        Position (3,) of the lower antenna, m.
+    y_m
+        Distance ahead of a target on the ground plane, m.
+    baseline_m
+        Length of the baseline, m.
+    baseline_angle
+        Attitudes, rad.
+
+    Returns
+    -------
+    ndarray
+        Derivative at the true baseline.
+    """
+    ground, height = y_m - antenna[1], antenna[2]
+    across_range = np.hypot(ground, height)
+    look = np.arctan2(ground, height)
+    angle = np.asarray(baseline_angle) - look
+    return ground * np.tan(angle) / baseline_m + ground / across_range / np.cos(angle)
+
+
 def angle_errors(
-    seen: baseline.View,
+    antenna: Floats,
+    place: tuple[float, float],
     *,
+    wavelength_m: float,
     baseline_m: float,
     length_std_m: float,
     angle_std_deg: float,
@@ -94,14 +136,18 @@ def angle_errors(
 ) -> xr.Dataset:
     """Return what errors of the baseline do to the height, by the baseline's attitude.
 
-    The true baseline gives the phase of the middle of the scene; a length, or an attitude, drawn
+    The true baseline gives the phase of a place on the ground; a length, or an attitude, drawn
     from a normal distribution around the true one then inverts it exactly
     (`geometry.invert_height`). No height reference takes any of the error away again.
 
     Parameters
     ----------
-    seen
-        The geometry; its own attitude is not read.
+    antenna
+        Position (3,) of the lower antenna, m.
+    place
+        The place, x and y in m.
+    wavelength_m
+        Wavelength, m; twice the carrier's where the baseline separates one end of the path alone.
     baseline_m
         Length of the baseline, m.
     length_std_m
@@ -120,30 +166,30 @@ def angle_errors(
     """
     angles = np.deg2rad(ANGLES_DEG)[:, None]
     angle_std = float(np.deg2rad(angle_std_deg))
+    r1, look = float(geometry.slant_range(antenna, *place)), geometry.look_angle(antenna, *place)
     upper = [
-        seen.lower + baseline_m * np.array([0.0, np.cos(beta), np.sin(beta)])
-        for beta in angles[:, 0]
+        antenna + baseline_m * np.array([0.0, np.cos(beta), np.sin(beta)]) for beta in angles[:, 0]
     ]
-    r2 = np.array([geometry.slant_range(antenna, seen.x_m, seen.y_m) for antenna in upper])
-    phase = geometry.interferometric_phase(seen.slant_range, r2, seen.wavelength_m)[:, None]
+    r2 = np.array([geometry.slant_range(end, *place) for end in upper])
+    phase = geometry.interferometric_phase(r1, r2, wavelength_m)[:, None]
 
     def std(length: ArrayLike, angle: Floats) -> Floats:
         height = geometry.invert_height(
-            seen.slant_range,
+            r1,
             phase,
             baseline_m=length,
             baseline_angle=angle,
-            antenna_height=float(seen.lower[2]),
-            along_track=seen.x_m - seen.lower[0],
-            wavelength_m=seen.wavelength_m,
+            antenna_height=float(antenna[2]),
+            along_track=place[0] - antenna[0],
+            wavelength_m=wavelength_m,
         )
         return np.nanstd(height, axis=1)
 
     # Each attitude has draws of its own: its neighbours show how far chance carries it.
     unit = rng.standard_normal((2, angles.size, draws))
-    eq5 = formulas.height_per_baseline_length(seen.slant_range, baseline_m, angles[:, 0], seen.look)
-    eq12 = formulas.height_per_baseline_angle(seen.slant_range, seen.look)
-    exact = baseline.height_per_length(seen, baseline_m, angles[:, 0])
+    eq5 = formulas.height_per_baseline_length(r1, baseline_m, angles[:, 0], look)
+    eq12 = formulas.height_per_baseline_angle(r1, look)
+    exact = height_per_length(antenna, place[1], baseline_m, angles[:, 0])
     return variables.dataset(
         "baseline_angle",
         {
@@ -161,9 +207,13 @@ def angle_errors(
 
 def _baseline_angle(products: Products, study: Study) -> xr.Dataset:
     del products
-    options = study.baseline_errors
+    options, planned = study.baseline_errors, Instrument.planned(study.radar)
+    antenna, _ = planned.separated
     return angle_errors(
-        baseline.view(study.radar, study.scene),
+        antenna,
+        instrument.middle(study.scene),
+        # With common receivers, or a common transmitter, half the phase.
+        wavelength_m=planned.wavelength * (1 if study.radar.system == "rail" else 2),
         baseline_m=study.radar.baseline_m,
         length_std_m=options.length_std_m,
         angle_std_deg=options.angle_std_deg,

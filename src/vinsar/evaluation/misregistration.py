@@ -17,6 +17,7 @@ from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
 from vinsar.processing import focusing
 from vinsar.radar import aperture, formulas, grid, trajectory, waveform
+from vinsar.radar.instrument import Instrument
 from vinsar.simulation import echo
 
 if TYPE_CHECKING:
@@ -176,7 +177,7 @@ def measure_shift(imager: PointImager, target: Floats, resolution: Floats) -> Fl
 
 
 def analyze(
-    apertures: Sequence[aperture.Aperture],
+    given: Instrument,
     imager: PointImager,
     *,
     targets: Mapping[str, tuple[float, float]],
@@ -184,14 +185,13 @@ def analyze(
     x: Floats,
     y: Floats,
     map_height_m: float,
-    frequency: Floats,
 ) -> xr.Dataset:
     """Compare the three answers for point targets of rising height, and map two over the scene.
 
     Parameters
     ----------
-    apertures
-        The aperture of each channel.
+    given
+        The instrument.
     imager
         As in `measure_shift`.
     targets
@@ -202,8 +202,6 @@ def analyze(
         Axes of the maps, m.
     map_height_m
         Target height of the maps, m.
-    frequency
-        Frequencies, Hz.
 
     Returns
     -------
@@ -211,9 +209,8 @@ def analyze(
         Product ``registration``; registration errors are lower minus upper.
     """
     ground = np.array(list(targets.values()))
-    resolution = waveform.ground_resolution(
-        apertures[0], ground[:, 0], ground[:, 1], frequency=frequency
-    )
+    apertures = given.lower, given.upper
+    resolution = given.resolution(ground[:, 0], ground[:, 1])
     answers = {
         name: _difference(formula, apertures, ground[:, :1], ground[:, 1:], heights)
         for name, formula in _FORMULAS.items()
@@ -235,9 +232,7 @@ def analyze(
             "image_shift": shift,
             "target_position": ground,
             "resolution": resolution,
-            "map_resolution": waveform.ground_resolution(
-                apertures[0], grid_x, grid_y, frequency=frequency
-            ),
+            "map_resolution": given.resolution(grid_x, grid_y),
             "map_height": map_height_m,
         }
         | answers
@@ -303,7 +298,7 @@ def _registration(products: Products, study: Study) -> xr.Dataset:
 
     x, y = grid.image_axes(study.imaging)
     return analyze(
-        trajectory.apertures(antennas),
+        Instrument.of(antennas, frequency),
         image_point,
         targets={
             "near": (options.near.x_m, options.near.y_m),
@@ -313,7 +308,6 @@ def _registration(products: Products, study: Study) -> xr.Dataset:
         x=x,
         y=y,
         map_height_m=options.map_height_m,
-        frequency=frequency,
     )
 
 

@@ -182,12 +182,12 @@ class Sheet:
     @property
     def samples(self) -> int:
         """Samples of a scan."""
-        return 2 * self.instrument.positions * self.instrument.frequency.size
+        return trajectory.samples(self.study.radar)
 
     @property
     def scan_duration(self) -> float:
         """Duration of a scan, s."""
-        return trajectory.scan_duration(self.study.radar, self.study.vehicle, self.samples)
+        return trajectory.scan_duration(self.study.radar, self.study.vehicle)
 
     @property
     def scene(self) -> Scene | Imaging:

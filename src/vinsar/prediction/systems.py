@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from vinsar.foundations import tables, variables
 from vinsar.foundations.configuration import swept_section
-from vinsar.foundations.constants import CHANNELS
 from vinsar.radar import instrument, trajectory
 
 if TYPE_CHECKING:
@@ -76,14 +75,13 @@ def compare(sweep: xr.Dataset, study: Study) -> list[System]:
         planned = instrument.Instrument.planned(radar_)
         place = instrument.middle(scene)
         across, ahead = planned.resolution(*place)
-        samples = len(CHANNELS) * planned.positions * radar_.frequency_count
         found.append(
             System(
                 name=f"{_NAMES[radar_.system]}, {radar_.aperture_length_m:g} m",
                 positions=planned.positions,
                 resolution_m=(float(across), float(ahead)),
                 height_of_ambiguity_m=float(planned.height_of_ambiguity(*place)),
-                scan_time_s=trajectory.scan_duration(radar_, study.vehicle, samples),
+                scan_time_s=trajectory.scan_duration(radar_, study.vehicle),
                 accuracy=statistics.isel(radar=number),
             )
         )

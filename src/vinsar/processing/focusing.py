@@ -342,7 +342,7 @@ def _profiles(products: Products, study: Study) -> xr.Dataset:
     antennas = motion.advance(
         products["trajectory"],
         speed_m_per_s=motion.told_speed(study),
-        duration_s=study.vehicle.scan_duration_s,
+        duration_s=trajectory.scan_duration(study.radar, study.vehicle),
     )
     near, far = trajectory.range_extent(antennas, *grid.image_axes(study.imaging))
     frequency = products["received"]["frequency"].values
@@ -390,6 +390,7 @@ STAGES = {
             *randomness.KEYS,
             *grid.KEYS,
             "vehicle",
+            *trajectory.SCAN_KEYS,
             "suppression",
             "imaging.range_window",
             "imaging.oversampling",

@@ -11,7 +11,8 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.radar import grid, trajectory, waveform
+from vinsar.radar import grid, instrument, waveform
+from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -108,8 +109,7 @@ def form(images: xr.Dataset, *, coherence_window_px: int) -> xr.Dataset:
 def looks(antennas: xr.Dataset, study: Study) -> float:
     """Return the effective number of looks of the coherence.
 
-    The multilook window's area over that of a resolution cell at the middle of the image, at
-    least 1: pixels finer than the resolution are not independent.
+    Those of the multilook window at the middle of the image (`Instrument.looks`).
 
     Parameters
     ----------
@@ -118,15 +118,9 @@ def looks(antennas: xr.Dataset, study: Study) -> float:
     study
         The configuration.
     """
-    x, y = grid.image_axes(study.imaging)
-    cell = waveform.ground_resolution(
-        trajectory.apertures(antennas)[0],
-        (x[0] + x[-1]) / 2,
-        (y[0] + y[-1]) / 2,
-        frequency=waveform.sampled(study.radar),
-    )
     side = study.interferogram.coherence_window_px * grid.pixel_side(study.imaging)
-    return max(1.0, float(side**2 / (cell[0] * cell[1])))
+    given = Instrument.of(antennas, waveform.sampled(study.radar))
+    return float(given.looks(side, *instrument.middle(study.imaging)))
 
 
 def _interferogram(products: Products, study: Study) -> xr.Dataset:

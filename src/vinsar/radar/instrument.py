@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from vinsar.processing.focusing import Imaging
     from vinsar.radar.trajectory import Radar
-    from vinsar.simulation.scene import Scene
 
     Floats = NDArray[np.floating]
 
@@ -68,10 +66,7 @@ class Instrument:
     @classmethod
     def planned(cls, radar: Radar) -> Instrument:
         """Return the instrument of a configuration's section ``radar``, without any errors."""
-        frequency = waveform.frequencies(
-            radar.start_frequency_hz, radar.stop_frequency_hz, radar.frequency_count
-        )
-        return cls.of(trajectory.planned(radar), frequency)
+        return cls.of(trajectory.planned(radar), waveform.sampled(radar))
 
     @property
     def wavelength(self) -> float:
@@ -114,6 +109,18 @@ class Instrument:
         return float(np.linalg.norm(upper - lower))
 
     @property
+    def foremost(self) -> float:
+        """How far ahead an antenna stands at most, y in m."""
+        return max(
+            float(end[1] + abs(travel[1]) / 2)
+            for part in (self.lower, self.upper)
+            for end, travel in (
+                (part.transmitter, part.transmitter_travel),
+                (part.receiver, part.receiver_travel),
+            )
+        )
+
+    @property
     def lowest(self) -> float:
         """Height of the lowest antenna, m."""
         return min(
@@ -148,7 +155,8 @@ class Instrument:
         ndarray, shape (2, ...)
             Resolution in x and y, m.
         """
-        return waveform.ground_resolution(self.lower, x, y, frequency=self.frequency)
+        path, slope = aperture.gradients(self.lower, x, y)
+        return np.abs(np.stack([self.wavelength / slope[0], 2 * self.range_resolution / path[1]]))
 
     def looks(self, side_m: float, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the independent looks of a square window: its area in resolution cells.
@@ -309,6 +317,12 @@ class Instrument:
         return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
 
 
-def middle(area: Scene | Imaging) -> tuple[float, float]:
-    """Return the middle of a part of the ground, x and y in m."""
+def middle(area: Any) -> tuple[float, float]:
+    """Return the middle of a part of the ground, x and y in m.
+
+    Parameters
+    ----------
+    area
+        Section ``scene`` or ``imaging`` of the configuration.
+    """
     return (area.x_min_m + area.x_max_m) / 2, (area.y_min_m + area.y_max_m) / 2

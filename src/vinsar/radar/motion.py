@@ -16,7 +16,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import AXES, SPEED_OF_LIGHT
 from vinsar.foundations.randomness import Draw
 from vinsar.foundations.stage import Stage
-from vinsar.radar import waveform
+from vinsar.radar import trajectory, waveform
 from vinsar.radar.trajectory import ANTENNAS
 
 if TYPE_CHECKING:
@@ -72,7 +72,8 @@ class Vehicle(Section, name="vehicle"):
         "constant speed ahead during the scan", "section 1, without a figure", ge=0, le=60
     )
     scan_duration_s: float = key(
-        "time from the first antenna position to the last; only a moving vehicle feels it",
+        "time of the cart along the rail, which only a moving vehicle feels; an array dwells on "
+        "each sample instead",
         "section 1, without a figure",
         gt=0,
         le=60,
@@ -388,7 +389,7 @@ def _true_trajectory(products: Products, study: Study) -> xr.Dataset:
     return advance(
         _displaced(products, study, "true"),
         speed_m_per_s=study.vehicle.forward_speed_m_per_s,
-        duration_s=study.vehicle.scan_duration_s,
+        duration_s=trajectory.scan_duration(study.radar, study.vehicle),
     )
 
 
@@ -409,7 +410,7 @@ def _recorded_trajectory(products: Products, study: Study) -> xr.Dataset:
     return advance(
         _displaced(products, study, "recorded"),
         speed_m_per_s=told_speed(study),
-        duration_s=study.vehicle.scan_duration_s,
+        duration_s=trajectory.scan_duration(study.radar, study.vehicle),
     )
 
 
@@ -423,11 +424,18 @@ STAGES = {
             "motion",
             "vehicle.forward_speed_m_per_s",
             "vehicle.scan_duration_s",
+            *trajectory.SCAN_KEYS,
         ),
     ),
     "recorded_trajectory": Stage(
         _recorded_trajectory,
         inputs=("trajectory",),
-        sections=(*randomness.KEYS, *waveform.KEYS, "motion", "vehicle"),
+        sections=(
+            *randomness.KEYS,
+            *waveform.KEYS,
+            "motion",
+            "vehicle",
+            *trajectory.SCAN_KEYS,
+        ),
     ),
 }

@@ -8,6 +8,7 @@ import numpy as np
 
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.constants import CHANNELS
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.radar import aperture, geometry, grid
@@ -218,19 +219,33 @@ def switched_array(
     )
 
 
-def scan_duration(radar: Radar, vehicle: Any, samples: int) -> float:
+def samples(radar: Radar) -> int:
+    """Return the samples of a scan: channels x positions x frequencies."""
+    positions = round(radar.aperture_length_m / radar.position_spacing_m) + 1
+    return len(CHANNELS) * positions * radar.frequency_count
+
+
+def scan_duration(radar: Radar, vehicle: Any) -> float:
     """Return the duration of a scan, s: the cart's on a rail, the dwell on all samples of an array.
 
     Parameters
     ----------
     radar, vehicle
         Sections of the configuration.
-    samples
-        Samples of a scan: channels x positions x frequencies.
     """
     # ASSUME: An array has one receiver, which is switched from element to element; a cart
     # measures both channels as it passes. A microsecond for each frequency.
-    return vehicle.scan_duration_s if radar.system == "rail" else samples * radar.dwell_s
+    return vehicle.scan_duration_s if radar.system == "rail" else samples(radar) * radar.dwell_s
+
+
+SCAN_KEYS = (
+    "radar.system",
+    "radar.aperture_length_m",
+    "radar.position_spacing_m",
+    "radar.frequency_count",
+    "radar.dwell_s",
+)
+"""Keys that `scan_duration` depends on, beside ``vehicle.scan_duration_s``."""
 
 
 def _line(length_m: float, spacing_m: float, height_m: float) -> NDArray[np.floating]:

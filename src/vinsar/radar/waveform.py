@@ -1,4 +1,4 @@
-"""The waveform and what follows from it: wavelength, resolution, ambiguity, critical baseline."""
+"""The stepped waveform: its frequencies, range resolution, ambiguity and weightings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from vinsar.foundations.constants import SPEED_OF_LIGHT
-from vinsar.radar import aperture
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -80,61 +79,6 @@ def range_resolution(bandwidth_hz: float) -> float:
 def unambiguous_range(frequency_step_hz: float) -> float:
     """Return the range in metres after which a stepped waveform repeats."""
     return SPEED_OF_LIGHT / (2 * frequency_step_hz)
-
-
-def azimuth_resolution(
-    wavelength_m: float, slant_range_m: ArrayLike, aperture_length_m: float
-) -> NDArray[np.floating]:
-    """Return the resolution across the range direction, ``lambda r / 2L``, at broadside.
-
-    Parameters
-    ----------
-    wavelength_m
-        Wavelength, m.
-    slant_range_m
-        Slant range from the aperture's centre, m.
-    aperture_length_m
-        Length of the aperture, m.
-
-    Returns
-    -------
-    ndarray
-        Resolution, m, in the shape of `slant_range_m`.
-    """
-    return wavelength_m * np.asarray(slant_range_m) / (2 * aperture_length_m)
-
-
-def ground_resolution(
-    aperture_: aperture.Aperture,
-    x: ArrayLike,
-    y: ArrayLike,
-    *,
-    frequency: NDArray[np.floating],
-) -> NDArray[np.floating]:
-    """Return the resolution on the ground plane in x and y.
-
-    In y the path's cell ``c / W`` over the path's derivative by y; in x the wavelength over the
-    derivative by x of the path's change along the aperture. On a rail that is ``lambda r / 2L``
-    over the squared cosine of the squint, by which the aperture shortens and the angle turns; with
-    one end that stands still, twice as much.
-
-    Parameters
-    ----------
-    aperture_
-        The aperture.
-    x, y
-        Points, m, of shapes that broadcast.
-    frequency
-        Frequencies, Hz.
-
-    Returns
-    -------
-    ndarray, shape (2, ...)
-        Resolution in x and y, m.
-    """
-    path, slope = aperture.gradients(aperture_, x, y)
-    cell = 2 * range_resolution(float(frequency[-1] - frequency[0]))
-    return np.abs(np.stack([wavelength(carrier(frequency)) / slope[0], cell / path[1]]))
 
 
 def window(name: WindowName, count: int) -> NDArray[np.floating]:

@@ -5,14 +5,14 @@ A rule is called with the sections that its parameters name and yields what is w
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vinsar.foundations.errors import Fault
-from vinsar.radar import aperture, baseline, grid, motion, trajectory, waveform
+from vinsar.radar import aperture, grid, motion, trajectory, waveform
+from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,51 +28,26 @@ if TYPE_CHECKING:
     from vinsar.study.options import Measurement, Outputs
 
 
-@dataclass(frozen=True)
-class _Derived:
-    """What the rules need of the radar; `foremost` is how far ahead of y = 0 an antenna stands."""
+# A dozen rules ask, and the cases of a sweep have few radars between them.
+@lru_cache(maxsize=32)
+def _planned(radar: Radar) -> Instrument:
+    return Instrument.planned(radar)
 
-    frequency: Any
-    wavelength: float
-    shortest_wavelength: float
-    range_cell: float
-    unambiguous_range: float
-    antennas: Any
-    apertures: Any
-    foremost: float
 
-    # A dozen rules ask, and the cases of a sweep have few radars between them.
-    @classmethod
-    @lru_cache(maxsize=32)
-    def of(cls, section: Radar) -> _Derived:
-        frequency = waveform.frequencies(
-            section.start_frequency_hz, section.stop_frequency_hz, section.frequency_count
-        )
-        antennas = trajectory.planned(section)
-        return cls(
-            frequency=frequency,
-            wavelength=waveform.wavelength(waveform.carrier(frequency)),
-            shortest_wavelength=waveform.wavelength(section.stop_frequency_hz),
-            range_cell=waveform.range_resolution(float(frequency[-1] - frequency[0])),
-            unambiguous_range=waveform.unambiguous_range(float(frequency[1] - frequency[0])),
-            antennas=antennas,
-            apertures=trajectory.apertures(antennas),
-            foremost=max(
-                0.0, *(antennas[name].values[..., 1].max() for name in ("transmitter", "receiver"))
-            ),
-        )
+def _reach(radar: Radar, part: Scene | Imaging, behind_m: float = 0.0) -> tuple[float, float]:
+    """Return the nearest and the farthest slant range of a part of the ground, m."""
+    x, y = (np.array([getattr(part, f"{axis}_{end}_m") for end in ("min", "max")]) for axis in "xy")
+    return trajectory.range_extent(trajectory.planned(radar), x, y + np.array([0.0, behind_m]))
 
-    def reach(self, part: Scene | Imaging, behind_m: float = 0.0) -> tuple[float, float]:
-        """Return the nearest and the farthest slant range of a part of the ground, m."""
-        x, y = (
-            np.array([getattr(part, f"{axis}_{end}_m") for end in ("min", "max")]) for axis in "xy"
-        )
-        return trajectory.range_extent(self.antennas, x, y + np.array([0.0, behind_m]))
+
+def _foremost(radar: Radar) -> float:
+    """Return how far ahead of y = 0 an antenna stands, m."""
+    return max(0.0, _planned(radar).foremost)
 
 
 def _ahead(radar: Radar, scene: Scene, imaging: Imaging) -> Iterator[Fault]:
     # Half a wavelength would do for the mathematics; a facet does for the visibility.
-    foremost = _Derived.of(radar).foremost + scene.facet_size_m
+    foremost = _foremost(radar) + scene.facet_size_m
     for name, part in (("scene", scene), ("imaging", imaging)):
         if part.y_min_m < foremost:
             yield Fault(
@@ -137,34 +112,40 @@ def _claims_judged(measurement: Measurement, outputs: Outputs) -> Iterator[Fault
         )
 
 
+def _duration_key(radar: Radar) -> str:
+    """Return the key that gives the duration of a scan."""
+    return "vehicle.scan_duration_s" if radar.system == "rail" else "radar.dwell_s"
+
+
 def _drives_short(
     radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle
 ) -> Iterator[Fault]:
-    speed, duration = vehicle.forward_speed_m_per_s, vehicle.scan_duration_s
-    foremost = _Derived.of(radar).foremost + scene.facet_size_m
+    speed, duration = vehicle.forward_speed_m_per_s, trajectory.scan_duration(radar, vehicle)
+    foremost = _foremost(radar) + scene.facet_size_m
     room = min(scene.y_min_m, imaging.y_min_m) - foremost
     if 0 < room < speed * duration / 2:
         yield Fault(
             "vehicle.forward_speed_m_per_s",
             speed,
-            f"must be at most {2 * room / duration:.3g} m/s, or vehicle.scan_duration_s at most "
-            f"{2 * room / speed:.3g} s: the vehicle drives {speed * duration / 2:.3g} m from the "
-            "middle of the scan to its end, into scene or image",
+            f"must be at most {2 * room / duration:.3g} m/s, or the scan at most "
+            f"{2 * room / speed:.3g} s ({_duration_key(radar)}): the vehicle drives "
+            f"{speed * duration / 2:.3g} m from the middle of the scan to its end, into scene or "
+            "image",
         )
 
 
 def _unambiguous(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) -> Iterator[Fault]:
-    derived = _Derived.of(radar)
-    behind = vehicle.forward_speed_m_per_s * vehicle.scan_duration_s / 2
+    period = _planned(radar).unambiguous_range
+    behind = vehicle.forward_speed_m_per_s * trajectory.scan_duration(radar, vehicle) / 2
     for name, part in (("scene", scene), ("imaging", imaging)):
-        _, far = derived.reach(part, behind)
-        if far > derived.unambiguous_range:
-            count = int(np.ceil((radar.frequency_count - 1) * far / derived.unambiguous_range)) + 1
+        _, far = _reach(radar, part, behind)
+        if far > period:
+            count = int(np.ceil((radar.frequency_count - 1) * far / period)) + 1
             yield Fault(
                 f"{name}.y_max_m",
                 part.y_max_m,
                 f"its farthest slant range of {far:.2f} m must be within the unambiguous range, "
-                f"{derived.unambiguous_range:.2f} m; take radar.frequency_count {count} or more",
+                f"{period:.2f} m; take radar.frequency_count {count} or more",
             )
 
 
@@ -199,28 +180,16 @@ def _cell(radar: Radar, part: Scene | Imaging) -> float:
     return float(_cells(radar, part).min())
 
 
-def _cells(radar_: Radar, part: Scene | Imaging) -> Any:
+def _cells(radar: Radar, part: Scene | Imaging) -> Any:
     """Return the finest resolution in x and in y in a part of the ground, m."""
-    derived = _Derived.of(radar_)
     x = np.clip(0.0, part.x_min_m, part.x_max_m)
-    cells = [
-        waveform.ground_resolution(derived.apertures[0], x, y, frequency=derived.frequency)
-        for y in (part.y_min_m, part.y_max_m)
-    ]  # fmt: skip
-    return np.min(cells, axis=0)
+    return _planned(radar).resolution(x, np.array([part.y_min_m, part.y_max_m])).min(axis=-1)
 
 
 def _widest_spacing(radar: Radar, scene: Scene) -> float:
     """Return the widest spacing of positions that images the scene's width without ambiguity, m."""
-    derived = _Derived.of(radar)
-    half = radar.aperture_length_m / 2
-    # Echoes from the sines s1 and s2 of the squint are told apart while the phase between
-    # neighbouring positions, 4 pi d (s1 - s2) / lambda, stays within a turn; where one end of the
-    # path stands still, half of it.
-    edge = np.array([scene.x_min_m - half, scene.x_max_m + half])
-    sine = edge / np.hypot(np.hypot(edge, scene.y_min_m), radar.rail_height_m)
-    moving_ends = 2 if radar.system == "rail" else 1
-    return derived.shortest_wavelength / (moving_ends * float(sine[1] - sine[0]))
+    edges = np.array([scene.x_min_m, scene.x_max_m])
+    return _planned(radar).widest_spacing(edges, scene.y_min_m)
 
 
 def _positions_dense(radar: Radar, scene: Scene) -> Iterator[Fault]:
@@ -237,24 +206,17 @@ def _driven_densely(radar: Radar, scene: Scene, vehicle: Vehicle) -> Iterator[Fa
     speed = vehicle.forward_speed_m_per_s
     if speed == 0:
         return
-    moving = motion.advance(
-        trajectory.planned(radar), speed_m_per_s=speed, duration_s=vehicle.scan_duration_s
-    )
-    edges = (scene.x_min_m, 0.0, scene.x_max_m), (scene.y_min_m, scene.y_max_m)
-    points = np.stack([*np.meshgrid(*edges), np.zeros((2, 3))], axis=-1).reshape(-1, 3)
-    change = np.zeros(len(points))
-    for end in ("transmitter", "receiver"):
-        places = moving[end].values[0]
-        ray = points - places.mean(axis=0)
-        step = (places[-1] - places[0]) / (len(places) - 1)
-        change += ray @ step / np.linalg.norm(ray, axis=-1)
-    # Echoes are told apart while their phases' steps differ by less than a turn.
-    if np.ptp(change) > _Derived.of(radar).shortest_wavelength:
+    duration = trajectory.scan_duration(radar, vehicle)
+    moving = motion.advance(trajectory.planned(radar), speed_m_per_s=speed, duration_s=duration)
+    found = Instrument.of(moving, waveform.sampled(radar))
+    x, y = np.meshgrid((scene.x_min_m, 0.0, scene.x_max_m), (scene.y_min_m, scene.y_max_m))
+    if np.ptp(found.growth(x, y)) > found.shortest_wavelength:
+        step = speed * duration / (found.positions - 1)
         yield Fault(
             "vehicle.forward_speed_m_per_s",
             speed,
-            f"the vehicle drives {step[1]:.3g} m from one antenna position to the next, and the "
-            "scene is imaged ambiguously; take a shorter vehicle.scan_duration_s or "
+            f"the vehicle drives {step:.3g} m from one antenna position to the next, and the "
+            f"scene is imaged ambiguously; take a shorter {_duration_key(radar)} or "
             "radar.position_spacing_m",
         )
 
@@ -262,10 +224,9 @@ def _driven_densely(radar: Radar, scene: Scene, vehicle: Vehicle) -> Iterator[Fa
 def _gate_before_image(radar: Radar, suppression: Suppression, imaging: Imaging) -> Iterator[Fault]:
     if suppression.method not in ("gate", "both"):
         return
-    derived = _Derived.of(radar)
-    near, far = derived.reach(imaging)
+    near, far = _reach(radar, imaging)
     # Ranges repeat: the gate lies beyond the image as well.
-    most = min(near / 2, derived.unambiguous_range - far)
+    most = min(near / 2, _planned(radar).unambiguous_range - far)
     if suppression.gate_range_m > most:
         yield Fault(
             "suppression.gate_range_m",
@@ -276,14 +237,14 @@ def _gate_before_image(radar: Radar, suppression: Suppression, imaging: Imaging)
 
 
 def _targets_imaged(radar: Radar, registration: Registration) -> Iterator[Fault]:
-    derived = _Derived.of(radar)
+    planned = _planned(radar)
     heights = np.array([registration.height_min_m, registration.height_max_m])
     for name, target in (("near", registration.near), ("far", registration.far)):
         images = [
             aperture.image_position(part, target.x_m, target.y_m, heights)
-            for part in derived.apertures
+            for part in (planned.lower, planned.upper)
         ]
-        if target.y_m <= derived.foremost or np.isnan(images).any():
+        if target.y_m <= _foremost(radar) or np.isnan(images).any():
             yield Fault(
                 f"registration.{name}.y_m",
                 target.y_m,
@@ -298,15 +259,13 @@ def _claims_of_a_rail(radar: Radar, outputs: Outputs) -> Iterator[Fault]:
 
 def _baseline_short(radar: Radar, scene: Scene) -> Iterator[Fault]:
     x = float(np.clip(0.0, scene.x_min_m, scene.x_max_m))
-    seen = replace(baseline.view(radar, scene), x_m=x, y_m=scene.y_min_m)
-    limit, across = seen.critical_baseline / 4, float(seen.across(radar.baseline_m))
-    if across > limit:
+    limit = float(_planned(radar).critical_baseline(x, scene.y_min_m)) / 4
+    if radar.baseline_m > limit:
         yield Fault(
             "radar.baseline_m",
             radar.baseline_m,
-            f"its part across the line of sight, {across:.3f} m, exceeds a quarter of "
-            f"the critical baseline, {limit:.3f} m, at the scene's near edge: coherence "
-            "will suffer",
+            f"exceeds a quarter of the critical baseline, {limit:.3f} m, at the scene's near edge: "
+            "coherence will suffer",
         )
 
 
@@ -329,7 +288,9 @@ def _sides_apart(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle)
     speed = vehicle.forward_speed_m_per_s
     lower = trajectory.apertures(
         motion.advance(
-            trajectory.planned(radar), speed_m_per_s=speed, duration_s=vehicle.scan_duration_s
+            trajectory.planned(radar),
+            speed_m_per_s=speed,
+            duration_s=trajectory.scan_duration(radar, vehicle),
         )
     )[0]
     # A transmitter that stands on the vehicle halves the way along x, and not that ahead.
@@ -345,12 +306,12 @@ def _sides_apart(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle)
 
 
 def _facets_coarse(radar: Radar, scene: Scene) -> Iterator[Fault]:
-    derived = _Derived.of(radar)
-    if scene.facet_size_m < derived.wavelength:
+    wavelength = _planned(radar).wavelength
+    if scene.facet_size_m < wavelength:
         yield Fault(
             "scene.facet_size_m",
             scene.facet_size_m,
-            f"is below the wavelength, {derived.wavelength:.4f} m: many facets for little",
+            f"is below the wavelength, {wavelength:.4f} m: many facets for little",
         )
 
 
