@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.floating]
 
+# Noise below which the phase unwraps, m.
+_UNWRAPS_M = 0.05
+
 
 @style.styled
 def draw(products: Products, study: Study) -> Figure:
@@ -43,14 +46,7 @@ def draw(products: Products, study: Study) -> Figure:
     axes = style.place(figure, 13.0, 28.0, 69.0, 69.0)
     handles: list[Any] = []
     everything: list[Floats] = []
-    for label, (predicted, measured), colour, marker in (
-        ("signal-to-noise ratio", _by_noise(products, study), style.BLUE, "o"),
-        ("length of the baseline", _by_baseline(products, study), style.ORANGE, "s"),
-        *(
-            (f"position errors along {name}", found, colour, "^v>"[AXES.index(name)])
-            for name, found, colour in _by_errors(products, study)
-        ),
-    ):
+    for label, (predicted, measured), colour, marker in _cases(products, study):
         handles += axes.plot(
             100 * predicted,
             100 * measured,
@@ -78,6 +74,33 @@ def draw(products: Products, study: Study) -> Figure:
     axes.set_title("Predicted and measured height noise")
     sweeps.legend(figure, handles, 8.0, 2.0, 2)
     return figure
+
+
+def numbers(products: Products, study: Study) -> str:
+    """Return how far measured and predicted noise differ where the phase unwraps, as a sentence."""
+    cases = [found for _, found, _, _ in _cases(products, study)]
+    predicted, measured = (np.concatenate(parts) for parts in zip(*cases, strict=True))
+    low = (predicted < _UNWRAPS_M) & np.isfinite(measured)
+    if not low.any():
+        return ""
+    ratio = np.sort(measured[low] / predicted[low])
+    most = f", {ratio[-2]:.2g} but for one" if ratio.size > 2 else ""
+    return (
+        f"Of {ratio.size} cases that are predicted below {100 * _UNWRAPS_M:g} cm the measured "
+        f"noise is {ratio[0]:.2g} to {ratio[-1]:.2g} times the predicted one{most}."
+    )
+
+
+def _cases(products: Products, study: Study) -> list[tuple[str, tuple[Floats, Floats], str, str]]:
+    """Return name, predicted and measured noise (case,) in m, colour and marker of each sweep."""
+    return [
+        ("signal-to-noise ratio", _by_noise(products, study), style.BLUE, "o"),
+        ("length of the baseline", _by_baseline(products, study), style.ORANGE, "s"),
+        *(
+            (f"position errors along {name}", found, colour, "^v>"[AXES.index(name)])
+            for name, found, colour in _by_errors(products, study)
+        ),
+    ]
 
 
 def _sheet(study: Study, sweep: str, **changes: dict[str, Any]) -> design.Sheet:
@@ -137,5 +160,6 @@ FIGURES = {
         ),
         sections=("figures", "sweeps", *design.SECTIONS),
         sweeps=("snr", "baseline_length", "vibration"),
+        numbers=numbers,
     ),
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vinsar.figures import FIGURES
 from vinsar.figures.drawing import sweeps
 
 
@@ -17,3 +18,16 @@ def test_it_shows_the_measured_spread_of_every_noise_level(usual, lines_of, prod
     measured = products["sweeps/snr"]["mad"].sel(region="visible_ground").mean("realization")
     shown = lines_of(axes)["signal-to-noise ratio"].get_ydata()
     np.testing.assert_allclose(shown, 100 * sweeps.NORMAL * measured)
+
+
+def test_the_caption_gives_the_range_of_the_ratio(usual, lines_of, products, study):
+    said = FIGURES["design_check"].numbers(products, study)
+    points = [
+        line.get_xydata()
+        for line in lines_of(usual("design_check").axes[0]).values()
+        if line.get_linestyle() == "None"
+    ]
+    predicted, measured = np.concatenate(points).T
+    ratio = measured[predicted < 5] / predicted[predicted < 5]
+    assert said.startswith(f"Of {ratio.size} cases")
+    assert f"{ratio.min():.2g} to {ratio.max():.2g} times" in said
