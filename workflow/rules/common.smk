@@ -9,7 +9,7 @@ from vinsar import figures
 from vinsar import report as study_report
 from vinsar.evaluation import detection_accuracy
 from vinsar.foundations.errors import ConfigurationError
-from vinsar.paper import claims
+from vinsar.paper import claims, likeness
 from vinsar.prediction import systems
 from vinsar.results import provenance
 from vinsar.simulation.scene import ELEVATION

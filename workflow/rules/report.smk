@@ -165,3 +165,24 @@ rule systems:
         caption=figures.FIGURES["systems"].caption,
     script:
         "../scripts/systems.py"
+
+
+rule likeness:
+    input:
+        **sweep_files(*likeness.SWEEPS, likeness.POSITION_ERRORS),
+        code=sources_of("paper.likeness", script="likeness"),
+    output:
+        report(
+            "<results>/likeness.md",
+            caption="../report/caption.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/likeness.log",
+    benchmark:
+        "<benchmarks>/likeness.tsv"
+    params:
+        configuration=configuration(),
+        caption=figures.FIGURES["likeness"].caption,
+    script:
+        "../scripts/likeness.py"
