@@ -48,6 +48,9 @@ PLATEAU_M = 0.043
 _LEAST_SHARE = 1e-4
 _BOUND = 2.0
 
+# Share of the largest variance below which a combination of the statistics has none of its own.
+_COLLINEAR = 1e-4
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -115,7 +118,8 @@ def compare(sweeps: Mapping[str, xr.Dataset]) -> list[Choice]:
         [np.cov(transformed(values), rowvar=False, ddof=1) for _, _, values in cases], axis=0
     )
     target = transformed(np.array(PUBLISHED))
-    inverse = np.linalg.inv(covariance)
+    # Statistics that always scatter together are one.
+    inverse = np.linalg.pinv(covariance, rcond=_COLLINEAR, hermitian=True)
 
     def distance(sample: Floats) -> float:
         away = target - sample.mean(axis=0)
