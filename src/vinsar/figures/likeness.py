@@ -61,6 +61,7 @@ def draw(products: Products, study: Study) -> Figure:
         axes = style.place(figure, left, _BOTTOM_MM, _WIDTH_MM, height)
         part = scale * values[..., number]
         spread = part.std(axis=1, ddof=1)
+        # Choices without heights leave a gap.
         for centre, wide, row, choice in zip(part.mean(axis=1), spread, at, choices, strict=True):
             like = abs(choice.deviations[number]) <= 2
             axes.errorbar(

@@ -48,6 +48,9 @@ PLATEAU_M = 0.043
 _LEAST_SHARE = 1e-4
 _BOUND = 2.0
 
+# Realizations with heights that a distance needs.
+_LEAST = 2
+
 # Share of the largest variance below which a combination of the statistics has none of its own.
 _COLLINEAR = 1e-4
 
@@ -114,33 +117,45 @@ def compare(sweeps: Mapping[str, xr.Dataset]) -> list[Choice]:
     cases = [
         (name, label, values) for name in SWEEPS for label, values in _cases(name, sweeps[name])
     ]
-    covariance = np.mean(
-        [np.cov(transformed(values), rowvar=False, ddof=1) for _, _, values in cases], axis=0
-    )
+    samples = [_known(transformed(values)) for _, _, values in cases]
+    scatter = [np.cov(known, rowvar=False, ddof=1) for known in samples if len(known) > 2]
+    covariance = np.mean(scatter, axis=0) if scatter else np.zeros((3, 3))
     target = transformed(np.array(PUBLISHED))
     # Statistics that always scatter together are one.
     inverse = np.linalg.pinv(covariance, rcond=_COLLINEAR, hermitian=True)
 
     def distance(sample: Floats) -> float:
+        if len(sample) < _LEAST:
+            return float("nan")
         away = target - sample.mean(axis=0)
         return float(np.sqrt(away @ inverse @ away))
 
     found = []
-    for name, label, values in cases:
-        sample = transformed(values)
+    for (name, label, values), sample in zip(cases, samples, strict=True):
         count = len(sample)
+        enough = count > _LEAST
         left_out = [distance(np.delete(sample, number, axis=0)) for number in range(count)]
+        unknown = np.full(3, np.nan)
         found.append(
             Choice(
                 sweep=name,
                 label=label,
                 values=values,
-                deviations=(target - sample.mean(axis=0)) / sample.std(axis=0, ddof=1),
+                deviations=(target - sample.mean(axis=0)) / sample.std(axis=0, ddof=1)
+                if enough
+                else unknown,
                 distance=distance(sample),
-                distance_std=float(np.sqrt((count - 1) * np.var(left_out))),
+                distance_std=float(np.sqrt((count - 1) * np.var(left_out)))
+                if enough
+                else float("nan"),
             )
         )
     return found
+
+
+def _known(sample: Floats) -> Floats:
+    """Return the realizations that have heights."""
+    return sample[np.isfinite(sample).all(axis=1)]
 
 
 def _cases(name: str, sweep: xr.Dataset) -> list[tuple[str, Floats]]:
@@ -165,7 +180,7 @@ def _value(value: object) -> str:
 
 def nearest(choices: list[Choice]) -> Choice:
     """Return the choice at the least distance."""
-    return min(choices, key=lambda choice: choice.distance)
+    return min(choices, key=lambda choice: np.nan_to_num(choice.distance, nan=np.inf))
 
 
 def single(choices: list[Choice]) -> Choice:
@@ -214,9 +229,11 @@ def position_errors(sweep: xr.Dataset) -> list[tuple[str, ...]]:
 
 def conclusion(choices: list[Choice]) -> str:
     """Return what follows, in a few sentences."""
+    if all(np.isnan(choice.distance) for choice in choices):
+        return "No choice tried has heights."
     like = [choice for choice in choices if choice.consistent]
     best, alone = nearest(choices), single(choices)
-    share, std, worst = (float(np.mean(part)) for part in best.values.T)
+    share, std, worst = (float(np.nanmean(part)) for part in best.values.T)
     text = (
         "No choice tried is within two standard deviations of all three published figures."
         if not like
