@@ -13,7 +13,7 @@ from vinsar.processing.height import ControlPoint
 from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
-PROCESSING = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
+PROCESSING = ("autofocus", "profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
 
 
 @pytest.fixture(scope="module")

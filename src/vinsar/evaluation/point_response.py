@@ -9,7 +9,7 @@ import numpy as np
 from vinsar.foundations import variables
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.radar import grid, motion, waveform
+from vinsar.radar import grid, motion, trajectory, waveform
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +47,10 @@ variables.declare("focus", VARIABLES)
 
 
 def _focus(products: Products, study: Study) -> xr.Dataset:
-    truth, recorded = products["true_trajectory"], products["recorded_trajectory"]
+    truth = products["true_trajectory"]
+    recorded = trajectory.displaced(
+        products["recorded_trajectory"], products["autofocus"]["displacement"].values
+    )
     frequency = waveform.sampled(study.radar)
     x, y = grid.image_axes(study.imaging)
     target = np.array([(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2, 0.0])
@@ -78,7 +81,7 @@ def _focus(products: Products, study: Study) -> xr.Dataset:
 STAGES = {
     "focus": Stage(
         _focus,
-        inputs=("true_trajectory", "recorded_trajectory"),
+        inputs=("true_trajectory", "recorded_trajectory", "autofocus"),
         sections=(*waveform.KEYS, *grid.KEYS, "imaging.range_window", "imaging.aperture_window"),
     ),
 }

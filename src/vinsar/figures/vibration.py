@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from vinsar.foundations.configuration import Study
     from vinsar.foundations.stage import Products
 
-_LOOKS = {
+LOOKS = {
     "x": sweeps.Look("error along x (the rail)", style.BLUE, "-", "o"),
     "y": sweeps.Look("along y (ahead)", style.ORANGE, style.DASHED, "s"),
     "z": sweeps.Look("along z (up)", style.INK, style.DASH_DOTTED, "^"),
 }
-_MODES = {"common": "(a) common to both antennas", "independent": "(b) independent"}
+MODES = {"common": "(a) common to both antennas", "independent": "(b) independent"}
 _HEIGHT_MM = 79.0
 _LEFTS, _BOTTOM, _WIDTH, _TALL = (12.0, 69.0, 131.0), 21.0, 46.0, 52.0
 
@@ -56,14 +56,14 @@ def draw(products: Products, study: Study) -> Figure:
     figure = style.new_figure(style.TWO_COLUMNS_MM, _HEIGHT_MM)
     # One scale for both panels: they are to be compared.
     limits = sweeps.around(100 * deviation.values, [100 * relief, 100 * random])
-    modes = [mode for mode in _MODES if mode in sweep["motion_channels"].values]
+    modes = [mode for mode in MODES if mode in sweep["motion_channels"].values]
     handles: list[Any] = []
     for mode, left in zip(modes, _LEFTS, strict=False):
         axes = style.place(figure, left, _BOTTOM, _WIDTH, _TALL)
         part = deviation.sel(motion_channels=mode)
         _heights(axes, part, limits)
         handles = _references(axes, part, relief, random)
-        axes.set_title(_MODES[mode])
+        axes.set_title(MODES[mode])
         if left == _LEFTS[0]:
             axes.set_ylabel("height std, whole scene (cm)")
     axes = style.place(figure, _LEFTS[2], _BOTTOM, _WIDTH, _TALL)
@@ -73,7 +73,7 @@ def draw(products: Products, study: Study) -> Figure:
     return figure
 
 
-def _levels(axes: Axes, levels: Any) -> None:
+def mark_levels(axes: Axes, levels: Any) -> None:
     """Scale the x axis: logarithmic above the lowest level, and with a place for zero."""
     from matplotlib.ticker import FixedLocator, FuncFormatter
 
@@ -91,17 +91,18 @@ def _levels(axes: Axes, levels: Any) -> None:
     axes.set_xlabel("level: std of the error (wavelengths)")
 
 
-def _axes_of(data: xr.DataArray) -> list[str]:
-    return [name for name in _LOOKS if name in data["motion_axis"].values]
+def axes_of(data: xr.DataArray | xr.Dataset) -> list[str]:
+    """Return the axes of the errors that a sweep has, in the order of their looks."""
+    return [name for name in LOOKS if name in data["motion_axis"].values]
 
 
 def _heights(axes: Axes, deviation: xr.DataArray, limits: tuple[float, float]) -> None:
     ordered = deviation.sortby("motion_level_wavelengths")
     levels = ordered["motion_level_wavelengths"].values
-    for name in _axes_of(ordered):
-        sweeps.curve(axes, levels, ordered.sel(motion_axis=name), _LOOKS[name], scale=100)
+    for name in axes_of(ordered):
+        sweeps.curve(axes, levels, ordered.sel(motion_axis=name), LOOKS[name], scale=100)
     sweeps.log_y(axes, limits)
-    _levels(axes, levels)
+    mark_levels(axes, levels)
 
 
 def _references(axes: Axes, deviation: xr.DataArray, relief: float, random: float) -> list[Any]:
@@ -124,13 +125,13 @@ def _focus(axes: Axes, gain: xr.DataArray) -> None:
     # Both antennas lose focus alike: their errors have one distribution.
     ordered = gain.sortby("motion_level_wavelengths").mean("channel")
     levels = ordered["motion_level_wavelengths"].values
-    for name in _axes_of(ordered):
-        sweeps.curve(axes, levels, ordered.sel(motion_axis=name), _LOOKS[name])
+    for name in axes_of(ordered):
+        sweeps.curve(axes, levels, ordered.sel(motion_axis=name), LOOKS[name])
     axes.set_ylim(0, 1.05)
     axes.yaxis.set_major_locator(style.round_ticks(6))
     axes.set_ylabel("amplitude left (1)")
     axes.set_title("(c) focus of a point target")
-    _levels(axes, levels)
+    mark_levels(axes, levels)
 
 
 def numbers(products: Products, study: Study) -> str:

@@ -7,32 +7,40 @@ between the channels, which heights need, is measured position by position and d
 
 1. `_coarse` takes each position's echo along the middle line of the scene, in sub-bands. The
    phases between neighbours, and their slopes over the sub-bands, are joined to one range error a
-   position by angular synchronisation.
+   position by angular synchronisation. `_spaced` takes the distances between neighbours from the
+   size of their coherence instead: no range error changes it, errors along the aperture do.
 2. `_Image.step` holds what each position adds to the image against what all others make of it, in
    sectors of angle and range. The phases over the sectors give three components of displacement:
    along x they are antisymmetric across the scene, along z they change with range. A normal prior,
    whose variances are found from the echoes (by axis, common to the antennas and between them),
    keeps components that nothing speaks for at zero.
 
-The second step starts from the navigated positions and from the first step's, and the better focus
-decides.
+The second step starts from the navigated positions or from one of the first step's, whichever the
+image is in better focus with.
 """
 
 from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from vinsar.foundations import variables
+from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
-from vinsar.processing import focusing
-from vinsar.radar import trajectory, waveform
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import Variable
+from vinsar.processing import focusing, leakage
+from vinsar.radar import grid, trajectory, waveform
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
@@ -49,6 +57,9 @@ _LEAST_POSITIONS = 16
 _PHASE_LAG, _SLOPE_LAG = 8, 3
 _COARSE_ROUNDS, _SLIP_ROUNDS = 3, 6
 
+# Standard deviation of a distance from the coherence, in units of that where it vanishes.
+_SPACING_STD = 0.05
+
 # Whole cycles that a position may be off, and from one position to the next.
 _MOST_SLIPS, _MOST_JUMP = 8, 2
 
@@ -62,10 +73,10 @@ _MARGIN_M = 0.5
 _ACROSS, _ALONG = 6, 4
 _WINDOW = (9, 3)
 
-# Steps from each start before the better one goes on, and at most; relative gain that ends them.
-_TRIAL_STEPS, _MOST_STEPS, _LEAST_GAIN = 3, 16, 1e-3
+# Steps of the image at most; relative gain in focus that ends them.
+_MOST_STEPS, _LEAST_GAIN = 16, 1e-3
 
-# What the start from range errors must gain in focus over the navigated positions.
+# What a start must gain in focus over one that assumes less.
 _PREFERENCE = 1.015
 
 # Gain in focus below which the navigated positions stay: errors that small harm no image.
@@ -73,6 +84,56 @@ _WORTH = 1.03
 
 # Bounds of the prior's standard deviation in wavelengths, and where it begins.
 _LEAST_STD, _FIRST_STD, _MOST_STD = 0.005, 1.0, 4.0
+
+
+variables.declare(
+    "autofocus",
+    {
+        "displacement": Variable(
+            ("channel", "position", "axis"),
+            "real",
+            "m",
+            "displacement of the antennas from their recorded positions",
+            "added to transmitter and receiver before imaging",
+        ),
+        "displacement_std": Variable(
+            ("channel", "position", "axis"),
+            "real",
+            "m",
+            "standard deviation of the displacement",
+            "NaN where the echoes tell nothing; 0 where the recorded positions are taken as exact",
+        ),
+        "range_correction": Variable(
+            ("channel", "position"),
+            "real",
+            "m",
+            "range correction at the middle of the scene",
+            "positive where the antenna was farther away than recorded",
+        ),
+        "range_std": Variable(
+            ("channel", "position"),
+            "real",
+            "m",
+            "standard deviation of the range correction",
+            "NaN where the echoes tell nothing; 0 where the recorded positions are taken as exact",
+        ),
+        "focus_recorded": Variable(
+            (), "real", "1", "share of the full coherence among the recorded positions"
+        ),
+        "focus_corrected": Variable(
+            (), "real", "1", "share of the full coherence among the corrected positions"
+        ),
+    },
+)
+
+
+class Autofocus(Section, name="autofocus"):
+    """Errors of the antenna positions, taken from the echoes."""
+
+    method: Literal["none", "echoes"] = key(
+        "imaging takes the recorded positions as they are, or as the echoes correct them",
+        "future work",
+    )
 
 
 @dataclass(frozen=True)
@@ -131,11 +192,14 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
     if gap is not None:
         return _nothing(channels, positions, gap)
     image = _Image(samples)
-    starts = [np.zeros((channels, positions, 3)), samples.along_sight(error)]
-    trials = [image.refine(start, _TRIAL_STEPS) for start in starts]
-    before = image.energy_of(starts[0])
-    chosen = trials[int(trials[1].energy > _PREFERENCE * trials[0].energy)]
-    result = image.refine(chosen.displacement, _MOST_STEPS - _TRIAL_STEPS, chosen.prior)
+    start: Floats = np.zeros((channels, positions, 3))
+    before = best = image.energy_of(start)
+    # Of all steps the focus after this one alone tells a wrong order of positions from a right one.
+    for other in (samples.along_sight(error), _spaced(samples)):
+        energy = image.energy_of(other)
+        if energy > _PREFERENCE * best:
+            start, best = other, energy
+    result = image.refine(start)
     focus = samples.focus(before, result), samples.focus(result.energy, result)
     std = np.sqrt(np.einsum("clii->cli", result.covariance))
     sight = samples.sight()
@@ -155,21 +219,6 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
         range_correction=np.einsum("cli,cli->cl", sight, result.displacement),
         range_std=range_std,
         focus=focus,
-    )
-
-
-def apply(recorded: xr.Dataset, displacement: Floats) -> xr.Dataset:
-    """Return the recorded positions with the displacement added.
-
-    Parameters
-    ----------
-    recorded
-        Product ``trajectory``.
-    displacement
-        Displacement (channel, position, axis), m, of transmitter and receiver alike.
-    """
-    return recorded.assign(
-        {name: recorded[name] + displacement for name in ("transmitter", "receiver")}
     )
 
 
@@ -259,7 +308,7 @@ class _Samples:
             *self.profiles[band],
             (self.transmitter + displacement).reshape(-1, 3),
             (self.receiver + displacement).reshape(-1, 3),
-            points,
+            np.ascontiguousarray(points.T),
             out,
         )
         return out
@@ -399,6 +448,48 @@ def _covariance(samples: _Samples, displacement: Floats) -> Complexes:
     return np.array(result)
 
 
+def _spaced(samples: _Samples) -> Floats:
+    """Return the displacement (channel, position, axis) along x that neighbours' coherence tells.
+
+    A level scene as wide as the image has the coherence ``sinc(k w d / lambda)`` at a distance d,
+    with w the sine of angle that it spans and k = 2, or 1 where one end stands still. Taken to lie
+    in their order, positions follow by least squares: distances that sum to the navigated length,
+    and navigated positions with the prior's errors.
+    """
+    displacement = np.zeros_like(samples.transmitter)
+    covariance = _covariance(samples, displacement)
+    middle = samples.line[len(samples.line) // 2]
+    width = samples.width(float(np.linalg.norm(middle - samples.center)))
+    place = (samples.transmitter + samples.receiver)[..., 0] / 2
+    cycle = samples.wavelength / (2 * width)
+    distances = cycle * np.linspace(0, 1, 400)
+    coherence = np.sinc(distances / cycle)
+    along = np.linspace(-0.5, 0.5, samples.positions)
+    apart = np.diff(np.eye(samples.positions), axis=0)
+    looks = samples.count // _SUB_BANDS
+    shape = -1, samples.channels, samples.positions, samples.channels, samples.positions
+    size = np.abs(covariance).reshape(shape)
+    for channel in range(samples.channels):
+        pairs = np.diagonal(size[:, channel, :, channel], 1, axis1=1, axis2=2)
+        found = np.sqrt(np.clip(((pairs**2).mean(axis=0) - 1 / looks) / (1 - 1 / looks), 0, 1))
+        length = along @ place[channel] / (along @ along)
+
+        def spacing(full: float, found: Floats = found) -> Floats:
+            return np.interp(-found / full, -coherence, distances)
+
+        # Noise lowers all coherences alike; the length tells by how much.
+        low, high = 0.5, 1.5
+        for _ in range(30):
+            full = (low + high) / 2
+            low, high = (low, full) if spacing(full).sum() > length else (full, high)
+        weight = 1 / (_SPACING_STD * cycle) ** 2
+        keep = 1 / (_FIRST_STD * samples.wavelength) ** 2
+        system = weight * apart.T @ apart + keep * np.eye(samples.positions)
+        told = weight * apart.T @ spacing(full) + keep * place[channel]
+        displacement[channel, :, 0] = np.linalg.solve(system, told) - place[channel]
+    return displacement
+
+
 def _weight(coherence: Floats, looks: int) -> Floats:
     """Return the weight of a phase, the inverse of its variance but for a factor."""
     square = np.clip((coherence**2 - 1 / looks) / (1 - 1 / looks), 0, 0.98)
@@ -497,30 +588,45 @@ class _Image:
             )
         ]
         self.order = np.concatenate(blocks)
-        self.begins = np.cumsum([0, *(block.size for block in blocks[:-1])])
+        self.begins = np.cumsum([0, *(block.size for block in blocks)])
         flat = points.reshape(-1, 3)
         self.points = np.ascontiguousarray(flat[self.order])
         self.middles = np.array([flat[block].mean(axis=0) for block in blocks])
         along = np.linspace(-1, 1, samples.positions)
         self.trend = np.linalg.qr(np.stack([np.ones_like(along), along], axis=1))[0]
 
+    def form(self, displacement: Floats) -> tuple[Complexes, Complexes, float]:
+        """Return what positions contribute (channel, position, point), their image, its energy.
+
+        The energy is relative to that of incoherent positions.
+        """
+        from vinsar.kernels import contributions
+
+        samples = self.samples
+        parts = samples.take(0, displacement, self.points)
+        parts = parts.reshape(samples.channels, samples.positions, -1)
+        image = np.zeros((samples.channels, len(self.points)), np.complex64)
+        power = sum(
+            contributions.add(part, total) for part, total in zip(parts, image, strict=True)
+        )
+        energy = float((image.real**2 + image.imag**2).sum()) / (power or 1.0)
+        return parts, image, energy
+
     def correlate(self, displacement: Floats) -> tuple[Complexes, float]:
         """Return each position's part of the image against the others' (channel, position, sector).
 
-        The energy of the image goes with it, relative to that of incoherent positions.
+        The energy of the image goes with it.
         """
-        samples = self.samples
-        shape = samples.channels, samples.positions, -1
-        parts = samples.take(0, displacement, self.points).reshape(shape)
-        image = parts.sum(axis=1)
-        power = (parts.real**2 + parts.imag**2).sum(axis=(0, 1))
-        energy = float((np.abs(image) ** 2).sum() / power.sum())
-        parts *= 1 / np.sqrt(power.mean())
-        image *= 1 / np.sqrt(power.mean())
+        from vinsar.kernels import contributions
+
+        parts, image, energy = self.form(displacement)
         reference = image + self.other_channel(image)
-        products = parts * reference.conj()[:, None]
-        products -= parts.real**2 + parts.imag**2
-        return np.add.reduceat(products, self.begins, axis=2).astype(complex), energy
+        result: Complexes = np.empty((*parts.shape[:2], len(self.middles)), complex)
+        for channel in range(len(parts)):
+            contributions.agree(parts[channel], reference[channel], self.begins, result[channel])
+        # The scale does not count; numbers near 1 keep clear of underflow.
+        result /= np.abs(result).mean() or 1.0
+        return result, energy
 
     def other_channel(self, image: Complexes) -> Complexes:
         """Return the other channel's image, turned by the phase of the topography between them."""
@@ -542,7 +648,7 @@ class _Image:
 
     def energy_of(self, displacement: Floats) -> float:
         """Return the energy of the image relative to that of incoherent positions."""
-        return self.correlate(displacement)[1]
+        return self.form(displacement)[2]
 
     def step(self, displacement: Floats, prior: Floats) -> _State:
         """Take one step of Gauss and Newton; the energy is that of the image before it."""
@@ -586,13 +692,12 @@ class _Image:
             result[mode] = np.sqrt((value**2).sum(axis=0) / np.maximum(known, 1e-3))
         return np.clip(result, _LEAST_STD * wavelength, _MOST_STD * wavelength)
 
-    def refine(self, displacement: Floats, steps: int, prior: Floats | None = None) -> _State:
+    def refine(self, displacement: Floats) -> _State:
         """Take steps until the energy gains no more; the energy is that of the result."""
-        if prior is None:
-            prior = np.full((2, 3), _FIRST_STD * self.samples.wavelength)
+        prior = np.full((2, 3), _FIRST_STD * self.samples.wavelength)
         state = _State(displacement, np.empty(0), prior, 0.0)
         best = 0.0
-        for _ in range(steps):
+        for _ in range(_MOST_STEPS):
             state = self.step(state.displacement, state.prior)
             if state.energy < best * (1 + _LEAST_GAIN):
                 break
@@ -612,3 +717,36 @@ def _precision(prior: Floats) -> Floats:
     for axis in range(3):
         result[:, axis, :, axis] = (_MODES.T / prior[:, axis] ** 2) @ _MODES
     return result
+
+
+def _autofocus(products: Products, study: Study) -> xr.Dataset:
+    recorded = products["recorded_trajectory"]
+    if study.autofocus.method == "none":
+        nothing = np.zeros(recorded["receiver"].shape)
+        still = nothing[..., 0].copy()
+        found = Motion(nothing, nothing, still, still, (np.nan, np.nan))
+    else:
+        x, y = grid.image_axes(study.imaging)
+        echo = leakage.suppress(products["received"], **study.suppression.model_dump())
+        found = estimate(echo, recorded, extent=(x[0], x[-1], y[0], y[-1]))
+    return variables.dataset(
+        "autofocus",
+        {
+            "displacement": found.displacement,
+            "displacement_std": found.displacement_std,
+            "range_correction": found.range_correction,
+            "range_std": found.range_std,
+            "focus_recorded": found.focus[0],
+            "focus_corrected": found.focus[1],
+        },
+        {"channel": recorded["channel"].values},
+    )
+
+
+STAGES = {
+    "autofocus": Stage(
+        _autofocus,
+        inputs=("received", "recorded_trajectory"),
+        sections=(*grid.KEYS, "suppression", "autofocus"),
+    ),
+}

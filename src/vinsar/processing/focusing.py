@@ -363,7 +363,9 @@ def _images(products: Products, study: Study) -> xr.Dataset:
     x, y = grid.image_axes(study.imaging)
     return backproject(
         products["profiles"],
-        products["recorded_trajectory"],
+        trajectory.displaced(
+            products["recorded_trajectory"], products["autofocus"]["displacement"].values
+        ),
         x=x,
         y=y,
         window=study.imaging.aperture_window,
@@ -399,7 +401,7 @@ STAGES = {
     ),
     "images": Stage(
         _images,
-        inputs=("profiles", "recorded_trajectory"),
+        inputs=("profiles", "recorded_trajectory", "autofocus"),
         sections=(*grid.KEYS, "imaging.aperture_window"),
         by_channel=True,
         parallel=True,

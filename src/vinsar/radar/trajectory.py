@@ -277,6 +277,24 @@ def apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
     return [aperture.fit(*channel) for channel in zip(*ends, strict=True)]
 
 
+def displaced(trajectory: xr.Dataset, displacement: NDArray[np.floating]) -> xr.Dataset:
+    """Return a trajectory with a displacement added to transmitters and receivers alike.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``.
+    displacement
+        Displacement (channel, position, axis), m.
+    """
+    return trajectory.assign(
+        {
+            name: trajectory[name].copy(data=trajectory[name].values + displacement)
+            for name in ("transmitter", "receiver")
+        }
+    )
+
+
 def range_extent(
     trajectory: xr.Dataset, x: NDArray[np.floating], y: NDArray[np.floating], z: ArrayLike = 0.0
 ) -> tuple[float, float]:
