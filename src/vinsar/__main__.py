@@ -10,7 +10,7 @@ from pathlib import Path
 from vinsar import measure
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
-from vinsar.results import lineage, reproduction
+from vinsar.results import export, lineage, reproduction
 from vinsar.study import ingest
 
 
@@ -121,7 +121,7 @@ def _schema(arguments: argparse.Namespace) -> int:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    ingest.export(arguments.folder, arguments.file)
+    export.measurement(arguments.folder, arguments.file)
     return 0
 
 

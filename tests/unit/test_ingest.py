@@ -12,7 +12,7 @@ import xarray as xr
 
 from vinsar.foundations.configuration import Study
 from vinsar.foundations.errors import ConfigurationError
-from vinsar.results import storage
+from vinsar.results import export, storage
 from vinsar.study import ingest, pipeline, validation
 
 ROOT = Path(__file__).parents[2]
@@ -51,7 +51,7 @@ def echo_file(products, tmp_path_factory):
     for name in ("received", "recorded_trajectory"):
         stored(products, name, folder)
     path = folder / "echo.nc"
-    ingest.export(folder, path)
+    export.measurement(folder, path)
     return path
 
 
@@ -337,7 +337,7 @@ def test_other_apertures_come_back_as_well(tmp_path, sections):
     products = pipeline.run(study, only="dem")
     for name in ("received", "recorded_trajectory"):
         stored(products, name, tmp_path)
-    ingest.export(tmp_path, tmp_path / "echo.nc")
+    export.measurement(tmp_path, tmp_path / "echo.nc")
     own = own_echoes(tmp_path / "echo.nc")
     made = pipeline.run(own, only="dem", given=ingest.read(own))
     # Profiles are cut to the range of the planned positions there, of the recorded ones here, and

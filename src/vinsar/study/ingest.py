@@ -19,7 +19,6 @@ from vinsar.foundations.errors import ConfigurationError, Fault
 from vinsar.radar import geometry, grid, trajectory, waveform
 from vinsar.radar.trajectory import ANTENNAS
 from vinsar.readers import elevation as surveyed
-from vinsar.results import storage
 from vinsar.simulation import scene
 from vinsar.simulation.echo import ECHO
 from vinsar.study import validation
@@ -230,33 +229,6 @@ def measurement(path: str) -> dict[str, xr.Dataset]:
         "trajectory": trajectory_,
         "recorded_trajectory": trajectory_,
     }
-
-
-def export(folder: str | Path, path: str | Path) -> None:
-    """Write a study's simulated echo in the form of a measurement.
-
-    Parameters
-    ----------
-    folder
-        The study's folder.
-    path
-        The file; it appears whole or not at all.
-
-    Raises
-    ------
-    ValueError
-        If the study has not been run.
-    """
-    received = storage.read(Path(folder) / "received.nc", "received")
-    antennas = storage.read(Path(folder) / "recorded_trajectory.nc", "recorded_trajectory")
-    data = variables.dataset(
-        "measurement",
-        {"echo": received["echo"].values}
-        | {name: antennas[name].values for name in ("transmitter", "receiver")},
-        {"frequency": received["frequency"].values},
-    )
-    title = f"echo of the study {received.attrs['vinsar_study']}, simulated"
-    storage.write(data, path, "measurement", {"title": title, "source": received.attrs["source"]})
 
 
 @contextmanager
