@@ -68,7 +68,10 @@ def _split(place, least, most, turn0, per_step, index, fraction, turn):  # type:
 @helper
 def _aside(y, z, antennas):  # type: ignore[no-untyped-def]
     # How near the antennas' tracks along x are to the block at least, how far above it at most.
-    low, high = z.min(), z.max()
+    low, high = z[0, 0], z[0, 0]
+    for row in range(z.shape[0]):
+        for column in range(z.shape[1]):
+            low, high = min(low, z[row, column]), max(high, z[row, column])
     nearest, above = np.inf, 0.0
     for end in range(antennas.shape[0]):
         for position in range(antennas.shape[2]):
@@ -257,7 +260,8 @@ def accumulate(
             polynomial = fits and half_z == 0
             if polynomial:
                 _fit(antennas, x[middle], y[row], z[row, middle], half_x, fit)
-                anchor[:] = fit[0]
+                for position in range(positions):
+                    anchor[position] = fit[0, position]
                 for power in range(1, 6):
                     for position in range(positions):
                         by[0, power, position] = fit[power, position] * steps_per_metre

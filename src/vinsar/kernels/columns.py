@@ -24,19 +24,19 @@ def resample(values: np.ndarray, place: np.ndarray, axis: np.ndarray, out: np.nd
     spacing = axis[1] - axis[0]
     x, y = np.empty(rows), np.empty(rows)
     for column in range(columns):
-        count, rising = 0, True
+        count = 0
         for row in range(rows):
             if np.isfinite(place[row, column]):
-                x[count], y[count] = place[row, column], values[row, column]
-                rising = rising and (count == 0 or x[count] >= x[count - 1])
+                # Places mostly rise. Those that coincide stay in the order of the image.
+                at = count
+                while at > 0 and x[at - 1] > place[row, column]:
+                    x[at], y[at] = x[at - 1], y[at - 1]
+                    at -= 1
+                x[at], y[at] = place[row, column], values[row, column]
                 count += 1
         if count == 0:
             out[:, column] = np.nan
             continue
-        if not rising:
-            # Stable, so that places that coincide stay in the order of the image.
-            order = np.argsort(x[:count], kind="mergesort")
-            x[:count], y[:count] = x[order], y[order]
         left = 0
         for row in range(axis.size):
             target = axis[row]

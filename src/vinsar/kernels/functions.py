@@ -19,6 +19,18 @@ _C1 = np.float32(-4.934792830619607)
 _C2 = np.float32(4.058411352861885)
 _C3 = np.float32(-1.3318765680766596)
 _C4 = np.float32(0.21968961108988486)
+# The same with one more power each: errors below 1.4e-8 and 3e-10.
+_F0 = np.float32(3.141592640183991)
+_F1 = np.float32(-5.167710090331259)
+_F2 = np.float32(2.550077659718429)
+_F3 = np.float32(-0.5982921594012917)
+_F4 = np.float32(0.07765940809071067)
+_G0 = np.float32(0.9999999997806519)
+_G1 = np.float32(-4.934802137228358)
+_G2 = np.float32(4.058709164342325)
+_G3 = np.float32(-1.3352120566615802)
+_G4 = np.float32(0.23493755892205392)
+_G5 = np.float32(-0.0243967165523548)
 _ONE, _HALF, _SIXTH = np.float32(1), np.float32(0.5), np.float32(1 / 6)
 _TWO_THIRDS = np.float32(2 / 3)
 
@@ -29,6 +41,16 @@ def phasor(turn: Any) -> Any:
     q = turn * turn
     s = turn * (_S0 + q * (_S1 + q * (_S2 + q * _S3)))
     c = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * _C4)))
+    twice = s + s
+    return _ONE - twice * s, twice * c
+
+
+@part
+def fine_phasor(turn: Any) -> Any:
+    """Return cosine and sine of an angle in cycles, -1/2 to 1/2; errors below -124 dB."""
+    q = turn * turn
+    s = turn * (_F0 + q * (_F1 + q * (_F2 + q * (_F3 + q * _F4))))
+    c = _G0 + q * (_G1 + q * (_G2 + q * (_G3 + q * (_G4 + q * _G5))))
     twice = s + s
     return _ONE - twice * s, twice * c
 

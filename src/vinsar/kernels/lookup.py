@@ -132,11 +132,14 @@ class Emitter:
         """Write a vector to a position."""
         self.builder.store(value, self.pointer(array, position, value.type)).align = 4
 
-    def splat(self, value: Any) -> Any:
-        """Return a vector of one whole number."""
-        nothing = ir.Constant(self.ints, ir.Undefined)
-        first = self.builder.insert_element(nothing, value, ir.Constant(_INT, 0))
-        return self.shuffled(first, nothing, [0] * self.lanes)
+    def repeated(self, values: Any) -> Any:
+        """Return a vector of a few numbers in turns."""
+        whole = ir.Constant(ir.VectorType(values[0].type, self.lanes), ir.Undefined)
+        vector = whole
+        for number, value in enumerate(values):
+            vector = self.builder.insert_element(vector, value, ir.Constant(_INT, number))
+        order = [lane % len(values) for lane in range(self.lanes)]
+        return self.shuffled(vector, whole, order)
 
     def shuffled(self, a: Any, b: Any, order: Any) -> Any:
         """Return the elements of two vectors, one after the other, in another order."""
@@ -160,7 +163,7 @@ class Emitter:
         start = builder.select(below, ir.Constant(_INT, 0), start)
         above = builder.icmp_signed(">", start, most)
         start = builder.select(above, most, start)
-        places = builder.add(indices, self.splat(builder.sub(origin, start)))
+        places = builder.add(indices, self.repeated([builder.sub(origin, start)]))
         return builder.sext(start, ir.IntType(64)), places
 
     def look_up(self, table: Any, start: Any, places: Any, taps: int, windows: int) -> list[Any]:

@@ -33,7 +33,8 @@ def smooth(spectra: np.ndarray, weights: np.ndarray) -> None:
                 line[0], line[columns + 1] = line[columns], line[1]
                 for column in range(columns):
                     sums[row + 1, column] = line[column] + line[column + 1] + line[column + 2]
-            sums[0], sums[rows + 1] = sums[rows], sums[1]
+            for column in range(columns):
+                sums[0, column], sums[rows + 1, column] = sums[rows, column], sums[1, column]
             peak = np.float32(0)
             for row in range(rows):
                 out = weights[i, j, row]

@@ -6,7 +6,6 @@ out, does not.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,6 @@ import numpy as np
 from vinsar.kernels.compiling import kernel, part
 
 _CHUNK = 512
-
-# Taylor series in t^2 of sin(pi t) / t and cos(pi t): on |t| <= 1/2 they leave out less than 1e-17.
-# PyPI's llvmlite has no vector math library: math.sin would keep the loop scalar.
-_SIN = tuple((-1) ** n * math.pi ** (2 * n + 1) / math.factorial(2 * n + 1) for n in range(11))
-_COS = tuple((-1) ** n * math.pi ** (2 * n) / math.factorial(2 * n) for n in range(11))
 
 
 @part
@@ -82,44 +76,3 @@ def gather(
                     weight[count] *= spreading_reference**2 / (out[i] * back[i])
                 count += 1
     return count
-
-
-@kernel
-def strengths(
-    path: np.ndarray,
-    weight: np.ndarray,
-    turns_per_metre: float,
-    steps_per_metre: float,
-    angle: np.ndarray,
-    strength: np.ndarray,
-) -> None:
-    """Turn paths into the points and strengths of a non-uniform Fourier transform.
-
-    Parameters
-    ----------
-    path, weight
-        From `gather` (facet,).
-    turns_per_metre
-        Cycles of the middle frequency per metre of path.
-    steps_per_metre
-        Cycles of the frequency step per metre of path.
-    angle
-        Output: phase of a frequency step, -pi to pi (facet,).
-    strength
-        Output: weight times the phasor of the middle frequency, complex128 (facet,).
-    """
-    parts = strength.view(np.float64)
-    for i in range(path.size):
-        steps = path[i] * steps_per_metre
-        angle[i] = 2 * np.pi * (steps - np.floor(steps + 0.5))
-        turns = path[i] * turns_per_metre
-        t = np.floor(turns + 0.5) - turns
-        q = t * t
-        s = _SIN[10]
-        c = _COS[10]
-        for n in range(9, -1, -1):
-            s = s * q + _SIN[n]
-            c = c * q + _COS[n]
-        s *= t
-        parts[2 * i] = weight[i] * (1 - 2 * s * s)
-        parts[2 * i + 1] = weight[i] * (2 * s * c)

@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 
 from vinsar.kernels.compiling import part
 
-SIZE = 128
+SIZE = 256
 """Items of a buffer."""
 
 
@@ -37,13 +37,20 @@ def _allocator(kind: Any) -> Any:
     return allocate
 
 
-_floats, _integers = _allocator(types.float32), _allocator(types.int32)
+_floats, _doubles = _allocator(types.float32), _allocator(types.float64)
+_integers = _allocator(types.int32)
 
 
 @part
 def floats():  # type: ignore[no-untyped-def]
     """Return a buffer of `SIZE` float32; a caller of compiled code owns it until it returns."""
     return carray(_floats(), SIZE)
+
+
+@part
+def doubles():  # type: ignore[no-untyped-def]
+    """Return a buffer of `SIZE` float64, like `floats`."""
+    return carray(_doubles(), SIZE)
 
 
 @part
@@ -57,6 +64,10 @@ if config.DISABLE_JIT:  # Then the kernels are plain Python.
     def floats() -> Any:
         """Return a buffer of `SIZE` float32."""
         return np.empty(SIZE, np.float32)
+
+    def doubles() -> Any:
+        """Return a buffer of `SIZE` float64."""
+        return np.empty(SIZE, np.float64)
 
     def integers() -> Any:
         """Return a buffer of `SIZE` int32."""

@@ -1,22 +1,103 @@
-"""Echoes of facets spread over range bins by cubic B-splines: the adjoint of back-projection.
+"""Echoes of facets spread over range bins by B-splines: the adjoint of back-projection.
 
-Each facet, turned by its phase at the middle frequency, adds to the four range bins around it. A
-Fourier transform of the bins, divided by the splines' sinc^4, then is the echo: what interpolating
-back-projection does, transposed, with the same error.
+Each facet, turned by its phase at the middle frequency, adds to the four or six range bins around
+it. A Fourier transform of the bins, divided by the splines' sinc^4 or sinc^6, then is the echo:
+what interpolating back-projection does, transposed, with the same error.
 """
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from typing import Any
 
+import numpy as np
+from llvmlite import ir
+from numba import config, types
+from numba.extending import intrinsic
+
+from vinsar.kernels import scratch
 from vinsar.kernels.compiling import kernel
-from vinsar.kernels.functions import phasor, spline
+from vinsar.kernels.functions import fine_phasor, phasor
+from vinsar.kernels.lookup import Emitter
 from vinsar.kernels.paths import distances
 
-TAPS = 4
-"""Range bins that a facet reaches: bins beyond the last one needed."""
+MOST_TAPS = 6
+"""Range bins that a facet reaches at most: bins beyond the last one needed."""
 
-_CHUNK = 512
+
+def _weights(taps: int) -> np.ndarray:
+    """Return the B-splines that reach a place between two bins, as polynomials of its fraction.
+
+    Parameters
+    ----------
+    taps
+        Number of splines, one more than their degree.
+
+    Returns
+    -------
+    ndarray, shape (power, tap)
+        Coefficients, of rising powers of the fraction.
+    """
+    # The spline around bin j is a sum of truncated powers; at the fraction f it is at f + taps/2
+    # - 1 - j from its middle (I. J. Schoenberg).
+    result = np.zeros((taps, taps))
+    for tap in range(taps):
+        for knot in range(taps - tap):
+            sign = (-1) ** knot * math.comb(taps, knot) / math.factorial(taps - 1)
+            for power in range(taps):
+                shift = (taps - 1 - tap - knot) ** (taps - 1 - power)
+                result[power, tap] += sign * math.comb(taps - 1, power) * shift
+    return result
+
+
+def _adder(taps: int) -> Any:
+    """Make the function that adds one facet to the bins."""
+    # Each weight counts twice, for the real and the imaginary part.
+    weights = np.repeat(_weights(taps), 2, axis=1).astype(np.float32)
+    # Vectors of 8 and of 4: together as long as the bins that a facet reaches.
+    pieces = [(0, 8)] if taps == 4 else [(0, 8), (8, 4)]
+
+    if config.DISABLE_JIT:  # Then the kernels are plain Python.
+
+        def add(parts, bin_, fraction, real, imag):  # type: ignore[no-untyped-def]
+            weight = fraction ** np.arange(taps, dtype=np.float32) @ weights
+            weight[::2] *= real
+            weight[1::2] *= imag
+            parts[2 * bin_ : 2 * (bin_ + taps)] += weight
+
+        return add
+
+    @intrinsic
+    def add_facet(typingctx, parts, bin_, fraction, real, imag):  # type: ignore[no-untyped-def]
+        """Add a facet to ``parts[2 * bin_:]``, real and imaginary parts in turns."""
+        del typingctx
+
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            array = Emitter(context, builder, signature, arguments).array(0)
+            begin = builder.shl(arguments[1], ir.Constant(arguments[1].type, 1))
+            for first, size in pieces:
+                emit = Emitter(context, builder, signature, arguments, size)
+
+                def constant(
+                    row: Any, emit: Any = emit, at: Any = slice(first, first + size)
+                ) -> Any:
+                    return ir.Constant(emit.floats, [float(value) for value in row[at]])
+
+                place = emit.repeated([arguments[2]])
+                weight = constant(weights[-1])
+                for row in weights[-2::-1]:
+                    weight = emit.fused(weight, place, constant(row))
+                at = builder.add(begin, ir.Constant(begin.type, first))
+                value = emit.repeated(arguments[3:])
+                emit.store(emit.fused(weight, value, emit.load(array, at)), array, at)
+            return context.get_dummy_value()
+
+        return types.void(parts, bin_, fraction, real, imag), generate
+
+    return add_facet
+
+
+_add_to_four, _add_to_six = _adder(4), _adder(6)
 
 
 @kernel
@@ -29,6 +110,7 @@ def spread(
     spreading_reference: float,
     turns_per_metre: float,
     steps_per_metre: float,
+    taps: int,
     bins: np.ndarray,
 ) -> None:
     """Add the visible facets of one antenna position to the range bins.
@@ -49,66 +131,66 @@ def spread(
         Cycles of the middle frequency per metre of path.
     steps_per_metre
         Cycles of the frequency step per metre of path.
+    taps
+        Bins that a facet reaches: 4 for cubic splines, 6 for those of fifth degree and phases that
+        are finer accordingly.
     bins
-        Output: one period of the frequency step in even bins, then `TAPS` more into which the last
-        ones spill, complex64. A facet in bin k adds to k and the three after it.
+        Output: one period of the frequency step in even bins, then `MOST_TAPS` more into which the
+        last ones spill, complex64. A facet in bin k adds to k and the next ones.
     """
     parts = bins.view(np.float32)
-    period = float(bins.size - TAPS)
+    period = float(bins.size - MOST_TAPS)
     monostatic = (
         transmitter[0] == receiver[0]
         and transmitter[1] == receiver[1]
         and transmitter[2] == receiver[2]
     )
-    out_buffer, back_buffer = np.empty(_CHUNK), np.empty(_CHUNK)
-    turn = np.empty(_CHUNK, np.float32)
-    fraction = np.empty(_CHUNK, np.float32)
-    index = np.empty(_CHUNK, np.int32)
-    weight = np.empty(_CHUNK, np.float32)
-    real = np.empty(_CHUNK, np.float32)
-    imag = np.empty(_CHUNK, np.float32)
-    first = np.empty(_CHUNK, np.float32)
-    second = np.empty(_CHUNK, np.float32)
-    third = np.empty(_CHUNK, np.float32)
-    fourth = np.empty(_CHUNK, np.float32)
-    for begin in range(0, amplitude.size, _CHUNK):
-        size = min(_CHUNK, amplitude.size - begin)
+    # Monostatic, the way back is the way out.
+    ways = 2 if monostatic else 1
+    turns_per_out, steps_per_out = ways * turns_per_metre, ways * steps_per_metre
+    out_buffer, back_buffer = scratch.doubles(), scratch.doubles()
+    turn, fraction, index = scratch.floats(), scratch.floats(), scratch.integers()
+    weight, real, imag = scratch.floats(), scratch.floats(), scratch.floats()
+    for begin in range(0, amplitude.size, scratch.SIZE):
+        size = min(scratch.SIZE, amplitude.size - begin)
         out, back = out_buffer[:size], back_buffer[:size]
         distances(out, facets, begin, transmitter)
         if monostatic:
-            back[:] = out
+            back = out
         else:
             distances(back, facets, begin, receiver)
+        for i in range(size):
+            weight[i] = amplitude[begin + i] if visible[begin + i] else np.float32(0)
         if spreading_reference > 0:
             for i in range(size):
                 ratio = spreading_reference * spreading_reference / (out[i] * back[i])
-                weight[i] = amplitude[begin + i] * np.float32(ratio)
-        else:
-            weight[:size] = amplitude[begin : begin + size]
+                weight[i] *= np.float32(ratio)
+        if not monostatic:
+            for i in range(size):
+                out[i] += back[i]
         for i in range(size):
-            path = out[i] + back[i]
-            turns = path * turns_per_metre
+            turns = out[i] * turns_per_out
             turn[i] = np.float32(np.floor(turns + 0.5) - turns)
-            steps = path * steps_per_metre
+        for i in range(size):
+            steps = out[i] * steps_per_out
             place = (steps - np.floor(steps)) * period
             floor = np.floor(place)
             fraction[i] = np.float32(place - floor)
             index[i] = np.int32(floor)
-        for i in range(size):
-            cosine, sine = phasor(turn[i])
-            real[i], imag[i] = weight[i] * cosine, weight[i] * sine
-            first[i], second[i], third[i], fourth[i] = spline(fraction[i])
-        for i in range(size):
-            if visible[begin + i]:
-                w0, w1, w2, w3 = first[i], second[i], third[i], fourth[i]
-                a, b = real[i], imag[i]
-                # Unsigned, so that no negative index needs a look.
-                k = np.uint64(2 * index[i])
-                parts[k] += w0 * a
-                parts[k + np.uint64(1)] += w0 * b
-                parts[k + np.uint64(2)] += w1 * a
-                parts[k + np.uint64(3)] += w1 * b
-                parts[k + np.uint64(4)] += w2 * a
-                parts[k + np.uint64(5)] += w2 * b
-                parts[k + np.uint64(6)] += w3 * a
-                parts[k + np.uint64(7)] += w3 * b
+        # Neighbours share bins: an addition would wait for the one before. So they take turns with
+        # facets from elsewhere.
+        quarter = (size + 3) // 4
+        if taps == 4:
+            for i in range(size):
+                cosine, sine = phasor(turn[i])
+                real[i], imag[i] = weight[i] * cosine, weight[i] * sine
+            for i in range(quarter):
+                for j in range(i, size, quarter):
+                    _add_to_four(parts, np.int64(index[j]), fraction[j], real[j], imag[j])
+        else:
+            for i in range(size):
+                cosine, sine = fine_phasor(turn[i])
+                real[i], imag[i] = weight[i] * cosine, weight[i] * sine
+            for i in range(quarter):
+                for j in range(i, size, quarter):
+                    _add_to_six(parts, np.int64(index[j]), fraction[j], real[j], imag[j])

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = (
-    "dask", "finufft", "kamui", "matplotlib", "netCDF4", "numba", "numpy", "rasterio",
+    "dask", "kamui", "matplotlib", "netCDF4", "numba", "numpy", "rasterio",
     "scikit-image", "scipy", "whirlwind-insar", "xarray",
 )  # fmt: skip
 

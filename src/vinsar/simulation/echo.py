@@ -21,8 +21,6 @@ from vinsar.foundations.variables import Variable
 from vinsar.radar import trajectory, waveform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -33,8 +31,12 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-MOST_ACCURATE_SPLAT_DB = -85.0
-"""The splat errs by -104 dB for facets at random places, by -87 dB for those on an even grid."""
+SPLAT_TAPS = {-85.0: 4, -110.0: 6}
+"""Range bins that a facet must reach for an error, dB.
+
+Four err by -104 dB for facets at random places and by -87 dB for those on an even grid; six err by
+what single precision does, some -118 dB, either way.
+"""
 
 Weighting = Literal["amplitude", "power"]
 _POSITIONS_PER_BLOCK = 27
@@ -105,9 +107,9 @@ def simulate(
     spreading
         Amplitude falls with 1 / (transmit range x receive range), relative to the mean range.
     accuracy_db
-        Largest relative error of the fast sum, as a norm over the frequencies: down to
-        `MOST_ACCURATE_SPLAT_DB` a splat (`_Splat`) some 7 times as fast as the non-uniform Fourier
-        transform (finufft) that serves below; None for the direct float64 sum.
+        Largest relative error of the fast sum (`_Splat`), as a norm over the frequencies, dB. If
+        it is less than what `SPLAT_TAPS` reach, or None, the sum is the direct one in float64,
+        hundreds of times as slow.
 
     Returns
     -------
@@ -177,130 +179,90 @@ def _simulate_block(
     reference: float,
     accuracy_db: float | None,
 ) -> None:
-    total: Callable[..., NDArray[np.complex128]]
-    if accuracy_db is None:
-        total = _Direct(frequency, amplitude.size)
-    elif accuracy_db >= MOST_ACCURATE_SPLAT_DB:
-        total, amplitude = _Splat(frequency), amplitude.astype(np.float32)
-    else:
-        total = _Transform(frequency, amplitude.size, accuracy_db)
-    for index in range(len(out)):
-        seen = np.ascontiguousarray(visible[index])
-        out[index] = total(facets, amplitude, seen, transmitter[index], receiver[index], reference)
+    reached = [db for db in SPLAT_TAPS if accuracy_db is not None and accuracy_db >= db]
+    total = _Splat(frequency, SPLAT_TAPS[max(reached)]) if reached else _Direct(frequency)
+    seen = np.ascontiguousarray(visible)
+    out[:] = total(
+        facets, amplitude, list(zip(seen, transmitter, receiver, strict=True)), reference
+    )
 
 
 class _Direct:
     """The sum over facets as it stands, in double precision."""
 
-    def __init__(self, frequency: NDArray[np.floating], facets: int) -> None:
-        self.frequency = frequency
-        self.path, self.weight = np.empty(facets), np.empty(facets)
-
-    def __call__(self, *gathered: Any) -> NDArray[np.complex128]:
-        from vinsar.kernels import paths
-
-        gather: Callable[..., int] = paths.gather
-        count = gather(*gathered, self.path, self.weight)
-        total = np.zeros(self.frequency.size, dtype=np.complex128)
-        # In pieces, so that memory does not grow with the facets.
-        for begin in range(0, count, 4096):
-            piece = slice(begin, min(begin + 4096, count))
-            turns = np.outer(self.frequency / SPEED_OF_LIGHT, self.path[piece])
-            total += np.exp(-2j * np.pi * turns) @ self.weight[piece]
-        return total
-
-
-class _Comb:
-    """The frequencies as modes of a Fourier transform: mode k is number ``k + size // 2``."""
-
     def __init__(self, frequency: NDArray[np.floating]) -> None:
-        self.size = frequency.size
-        step = float(frequency[-1] - frequency[0]) / (self.size - 1)
-        self.turns_per_metre = float(frequency[self.size // 2]) / SPEED_OF_LIGHT
-        self.steps_per_metre = step / SPEED_OF_LIGHT
-
-
-class _Transform:
-    """The sum over facets as a type-1 non-uniform Fourier transform, planned once a block."""
-
-    def __init__(self, frequency: NDArray[np.floating], facets: int, accuracy_db: float) -> None:
-        import finufft
-
-        self.comb = _Comb(frequency)
-        self.plan = finufft.Plan(
-            1,
-            (frequency.size,),
-            eps=max(10 ** (accuracy_db / 20) / 2, 1e-14),  # it errs by up to its eps and more
-            isign=-1,
-            nthreads=1,
-        )
-        self.path, self.weight = np.empty(facets), np.empty(facets)
-        self.angle, self.strength = np.empty(facets), np.empty(facets, np.complex128)
-
-    def __call__(self, *gathered: Any) -> NDArray[np.complex128]:
-        from vinsar.kernels import paths
-
-        comb = self.comb
-        gather: Callable[..., int] = paths.gather
-        count = gather(*gathered, self.path, self.weight)
-        if count == 0:
-            return np.zeros(comb.size, dtype=np.complex128)
-        angle, strength = self.angle[:count], self.strength[:count]
-        paths.strengths(
-            self.path[:count], self.weight[:count], comb.turns_per_metre, comb.steps_per_metre,
-            angle, strength,
-        )  # fmt: skip
-        self.plan.setpts(angle)
-        return np.asarray(self.plan.execute(strength))
-
-
-class _Splat:
-    """The sum over facets by cubic B-splines on range bins, in single precision.
-
-    The splines' sinc^4 is divided out, so that their spectral images remain as its error: what the
-    facets return at the frequencies ``f - n P``, n != 0, where P is the bins' sampling rate. For
-    random facets that is as much as in the band, weighted ``(1 / (2 n m))^4`` at the band's edges
-    with m bins a resolution cell: -103 dB for m = 8. But at low frequencies all facets are in
-    phase, so P exceeds the highest frequency. Facets on an even grid (`facet_jitter` of 0) may echo
-    louder at such a frequency than in the band: -87 dB were seen.
-    """
-
-    def __init__(self, frequency: NDArray[np.floating]) -> None:
-        from scipy import fft
-
-        from vinsar.kernels import splat
-
-        self.comb = _Comb(frequency)
-        highest = float(frequency[-1]) / SPEED_OF_LIGHT / self.comb.steps_per_metre
-        self.period = fft.next_fast_len(math.ceil(max(8 * frequency.size, 1.2 * highest)))
-        self.modes = modes = np.arange(frequency.size) - frequency.size // 2
-        # A facet adds to the bin before its own and to three more: the bins are late by one.
-        self.correction = np.exp(2j * np.pi * modes / self.period) / (
-            np.sinc(modes / self.period) ** splat.TAPS
-        )
-        self.bins = np.empty(self.period + splat.TAPS, np.complex64)
+        self.wavenumber = -2j * np.pi * frequency / SPEED_OF_LIGHT
 
     def __call__(
         self,
         facets: NDArray[np.floating],
         amplitude: NDArray[np.floating],
-        visible: NDArray[np.bool_],
-        transmitter: NDArray[np.floating],
-        receiver: NDArray[np.floating],
+        positions: list[tuple[Any, Any, Any]],
         reference: float,
     ) -> NDArray[np.complex128]:
+        """Return the echo (position, frequency) from what each position sees, sends and hears."""
+        from vinsar.kernels import paths
+
+        path, weight = np.empty(amplitude.size), np.empty(amplitude.size)
+        total = np.zeros((len(positions), self.wavenumber.size), dtype=np.complex128)
+        for number, antennas in enumerate(positions):
+            count = int(paths.gather(facets, amplitude, *antennas, reference, path, weight))
+            # In pieces, so that memory does not grow with the facets.
+            for begin in range(0, count, 4096):
+                piece = slice(begin, min(begin + 4096, count))
+                total[number] += np.exp(np.outer(self.wavenumber, path[piece])) @ weight[piece]
+        return total
+
+
+class _Splat:
+    """The sum over facets by B-splines on range bins, in single precision.
+
+    The frequencies are modes of a Fourier transform of the bins, mode ``k`` of the sampled
+    frequency number ``k + size // 2``. The splines' ``sinc^taps`` is divided out, so that their
+    spectral images remain as its error: what the facets return at the frequencies ``f - n P``, n !=
+    0, where P is the bins' sampling rate. For random facets that is as much as in the band,
+    weighted ``(1 / (2 n m))^taps`` at the band's edges with m bins a resolution cell: for m = 8,
+    -103 dB of four taps and -155 dB of six. But at low frequencies all facets are in phase, so P
+    exceeds the highest frequency. Facets on an even grid (`facet_jitter` of 0) may echo louder at
+    such a frequency than in the band: by up to 17 dB, it was seen.
+    """
+
+    def __init__(self, frequency: NDArray[np.floating], taps: int) -> None:
+        from scipy import fft
+
+        self.taps = taps
+        step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
+        self.turns_per_metre = float(frequency[frequency.size // 2]) / SPEED_OF_LIGHT
+        self.steps_per_metre = step / SPEED_OF_LIGHT
+        highest = float(frequency[-1]) / step
+        self.period = fft.next_fast_len(math.ceil(max(8 * frequency.size, 1.2 * highest)))
+        self.modes = np.arange(frequency.size) - frequency.size // 2
+
+    def __call__(
+        self,
+        facets: NDArray[np.floating],
+        amplitude: NDArray[np.floating],
+        positions: list[tuple[Any, Any, Any]],
+        reference: float,
+    ) -> NDArray[np.complex128]:
+        """Return the echo (position, frequency) from what each position sees, sends and hears."""
         from scipy import fft
 
         from vinsar.kernels import splat
 
-        self.bins[:] = 0
-        splat.spread(
-            facets, amplitude, visible, transmitter, receiver, reference,
-            self.comb.turns_per_metre, self.comb.steps_per_metre, self.bins,
-        )  # fmt: skip
-        self.bins[: splat.TAPS] += self.bins[self.period :]
-        spectrum = fft.fft(self.bins[: self.period])
-        return np.asarray(np.take(spectrum, self.modes, mode="wrap") * self.correction)
+        single = amplitude.astype(np.float32)
+        bins = np.zeros((len(positions), self.period + splat.MOST_TAPS), np.complex64)
+        for row, antennas in zip(bins, positions, strict=True):
+            splat.spread(
+                facets, single, *antennas, reference, self.turns_per_metre, self.steps_per_metre,
+                self.taps, row,
+            )  # fmt: skip
+        bins[:, : splat.MOST_TAPS] += bins[:, self.period :]
+        spectrum = fft.fft(bins[:, : self.period])
+        # A facet adds to its own bin and the next ones, not to those around it: the bins are late.
+        late = np.exp(2j * np.pi * (self.taps // 2 - 1) * self.modes / self.period)
+        correction = late / np.sinc(self.modes / self.period) ** self.taps
+        return np.asarray(np.take(spectrum, self.modes, axis=-1, mode="wrap") * correction)
 
 
 def add_noise(
@@ -457,7 +419,8 @@ class Echo(Section, name="echo"):
         le=0,
     )
     accuracy_db: float = key(
-        "largest error of the fast sum against the direct one; from -85 on, many times as fast",
+        "largest error of the sum over facets against the direct one; from -85 on it is fastest, "
+        "below -110 it is the direct one, hundreds of times as slow",
         "not given",
         ge=-200,
         le=-40,
