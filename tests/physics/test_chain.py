@@ -52,7 +52,7 @@ def reconstruct(images, reference):
     )  # fmt: skip
     unwrapped = unwrapping.unwrap(smooth, formed["coherence"], method="whirlwind", looks=1.0)
     offset = height.phase_offset(unwrapped, images, reference)
-    return height.invert(unwrapped, images, offset)["height"].values
+    return height.invert(unwrapped, images, offset).height
 
 
 @pytest.fixture(scope="module")

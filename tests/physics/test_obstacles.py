@@ -49,7 +49,7 @@ def test_a_box_is_the_one_obstacle_within_a_resolution_cell_of_its_place(product
     assert abs(found["detected_y"].values[obstacles][0] - AT[1]) < 0.15
     # Its wall, in the same cells as its edges, lies half as high.
     height = found["detected_height"].values[obstacles][0]
-    assert HEIGHT / 2 < height < HEIGHT + 3 * float(found["height_noise"].median())
+    assert HEIGHT / 2 < height < HEIGHT + 3 * float(products["dem"]["height_std"].median())
 
 
 def test_what_the_box_hides_is_unknown_and_the_patch_is_free(products):

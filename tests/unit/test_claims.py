@@ -40,7 +40,7 @@ def shaken(levels=LEVELS, scatter=0.0, **curves):
     data = {}
     for name, variable in SWEEP.items():
         values = std
-        for size in (3 if dim == "region" else 2 for dim in variable.dims):
+        for size in (4 if dim == "region" else 2 for dim in variable.dims):
             values = np.repeat(values[..., None], size, axis=-1)
         data[name] = values.astype(int) if name == "residues" else values
     swept = {

@@ -31,7 +31,7 @@ def test_a_shadow_is_found_and_lit_speckle_is_not():
     level = np.ones(shape)
     level[40:60, 30:45] = 0.1
     product = np.abs(level * image) ** 2 + 0j
-    found = classification.shadow(product, resolution=np.full((2, *shape), 1.0), spacing_m=1.0)
+    found = classification.shadow(product, resolution=np.full((2, *shape), 1.0), spacing=(1.0, 1.0))
     assert found[41:59, 31:44].mean() > 0.97
     far = np.ones(shape, bool)
     far[34:66, 24:51] = False
@@ -105,7 +105,7 @@ def test_the_outer_thirds_of_the_band_tell_a_lost_cycle(lost):
         # A cycle too low: the phase falls with the height.
         phase + 2 * np.pi * lost,
         antennas,
-        x=np.zeros(phase.shape[1]),
+        x=0.05 * np.arange(phase.shape[1]),
         y=y,
         wavelength_m=wavelength,
         resolution=resolution,
@@ -123,7 +123,7 @@ def test_the_outer_thirds_of_the_band_tell_a_lost_cycle(lost):
 def test_pixels_too_coarse_for_the_band_say_nothing():
     images, phase, antennas, y, wavelength = raised(0.2, np.random.default_rng(8), lines=4)
     found = classification.split_band(
-        images, phase, antennas, x=np.zeros(4), y=y, wavelength_m=wavelength,
+        images, phase, antennas, x=0.05 * np.arange(4), y=y, wavelength_m=wavelength,
         resolution=np.full((2, *phase.shape), 0.04), relative_bandwidth=2 / 14, rising=False,
     )  # fmt: skip
     assert all(np.isinf(part.std).all() for part in found)
@@ -133,14 +133,14 @@ def test_a_contradiction_of_the_band_spreads_over_what_is_probable():
     missing = box(1.0, 12.0, 12.4) + box(0.3, 12.5, 12.6) * 1.5
     cycles = [Cycles(missing, grid(0.15)), Cycles(missing * 0.9, grid(0.08))]
     none = np.zeros(missing.shape, bool)
-    found = classification.uncertain_cycles(cycles, none, none, window_px=5)
+    found = classification.uncertain_cycles(cycles, none, none, window_px=(5, 5))
     assert found[missing > 0.4].all()
     assert not found[Y < 11.7].any()
     doubtful = [Cycles(missing, grid(0.5)), Cycles(missing, grid(0.5))]
-    assert not classification.uncertain_cycles(doubtful, none, none, window_px=5).any()
+    assert not classification.uncertain_cycles(doubtful, none, none, window_px=(5, 5)).any()
     # Before too long a shadow a likely contradiction is enough.
     before = box(1.0, 12.3, 12.4) > 0
-    assert classification.uncertain_cycles(doubtful, none, before, window_px=5)[before].all()
+    assert classification.uncertain_cycles(doubtful, none, before, window_px=(5, 5))[before].all()
 
 
 def test_an_island_stays_only_if_the_band_confirms_its_cycle():
@@ -151,13 +151,13 @@ def test_an_island_stays_only_if_the_band_confirms_its_cycle():
     reference[:3, :3] = True
     sure = Cycles(grid(0.05), grid(0.2))
     unsure = Cycles(grid(0.05), grid(3.0))
-    assert not classification.islands(valid, reference, sure, window_px=5).any()
-    found = classification.islands(valid, reference, unsure, window_px=5)
+    assert not classification.islands(valid, reference, sure, window_px=(5, 5)).any()
+    found = classification.islands(valid, reference, unsure, window_px=(5, 5))
     assert found[25:35, 15:25].all()
     assert found.sum() == 100
     # Without a reference nothing is held.
     nowhere = np.zeros(valid.shape, bool)
-    assert classification.islands(valid, nowhere, unsure, window_px=5)[0, 0]
+    assert classification.islands(valid, nowhere, unsure, window_px=(5, 5))[0, 0]
 
 
 def test_pixels_out_of_order_are_laid_over():
@@ -180,7 +180,7 @@ def test_each_cell_has_the_class_of_its_fault():
     found = classification.classify(
         height, std, dark=dark, folded=folded, variance=variance,
         cycles=[Cycles(grid(), grid(0.1)), Cycles(grid(), grid(0.1))], ambiguity=grid(0.9),
-        reference=reference, antennas=[ANTENNA], x=X, y=Y, window_px=5,
+        reference=reference, antennas=[ANTENNA], x=X, y=Y, window_px=(5, 5),
     )  # fmt: skip
     assert found.dtype == np.int8
     assert (found[-1] == classification.OUTSIDE).all()

@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 from vinsar.foundations import variables
 from vinsar.processing import detection
+from vinsar.processing.classification import SHADOW, UNCERTAIN_CYCLE, VALID
 from vinsar.processing.detection import Detection
 
 OPTIONS = {
@@ -17,50 +18,38 @@ OPTIONS = {
     "ground_window_m": None,
     "multilook_window_m": 0.25,
     "background_window_m": 3.0,
-    "shadow_level_db": -4.0,
     "amplitude_threshold_db": 6.0,
 }
-LOOKS = 5.0
 X, Y = np.arange(-50, 51) * 0.04, 10 + np.arange(126) * 0.04
 AHEAD, ACROSS = np.meshgrid(Y, X, indexing="ij")
 
 
 @pytest.fixture(scope="module")
 def detect(ideal_phase):
-    """Detect on given heights, image power and coherence, all at the pixels of level ground."""
-    unwrapped, images = ideal_phase(lambda x, y: 0 * x + 0 * y, X, Y)
-    lower, upper = np.array([0, 0, 2.0]), np.array([0, 0, 2.3])
-    points = np.stack([ACROSS, AHEAD, 0 * ACROSS], axis=-1)
-    ranges = [np.linalg.norm(points - antenna, axis=-1) for antenna in (lower, upper)]
-    level = -4 * np.pi / 0.0214 * (ranges[0] - ranges[1])
+    """Detect on given heights, their standard deviation and class, and the image's power."""
+    _, images = ideal_phase(lambda x, y: 0 * x + 0 * y, X, Y)
     rng = np.random.default_rng(5)
     speckle = rng.normal(size=(2, *ACROSS.shape)) @ np.eye(X.size) + 1j * rng.normal(
         size=(2, *ACROSS.shape)
     )
 
-    def make(height, power=1.0, coherence=0.999, **changes):
+    def make(height, power=1.0, std=0.001, kind=VALID, **changes):
+        zeros = np.zeros(height.shape)
         dem = variables.dataset(
             "dem",
             {
                 "height": height,
-                "image_height": np.zeros(height.shape),
-                "absolute_phase": unwrapped["phase"].values + level,
-                "phase_offset": np.zeros(height.shape),
+                "height_std": zeros + std,
+                "height_class": (zeros + kind).astype(np.int8),
+                "image_height": zeros,
+                "absolute_phase": zeros,
+                "phase_offset": zeros,
             },
             {"x": X, "y": Y},
         )
         image = images.copy(deep=True)
         image["image"] = (image["image"].dims, speckle * np.sqrt(power), image["image"].attrs)
-        interferogram = variables.dataset(
-            "interferogram",
-            {
-                "interferogram": np.ones(height.shape, complex),
-                "coherence": np.broadcast_to(coherence, height.shape).astype(float),
-            },
-            {"x": X, "y": Y},
-        )
-        options = Detection.model_validate(OPTIONS | changes)
-        return detection.detect(dem, image, interferogram, options=options, looks=LOOKS)
+        return detection.detect(dem, image, options=Detection.model_validate(OPTIONS | changes))
 
     return make
 
@@ -94,13 +83,9 @@ def test_a_box_or_a_hole_is_found_with_its_place_extent_and_height(detect, rise)
 
 @pytest.mark.parametrize("factor", [1.5, 2.5])
 def test_noise_alone_gives_the_expected_rate_of_alarms(detect, factor):
-    # The bound written out for a vertical baseline: h_amb / 2 pi sqrt((1 - g^2) / (2 N g^2)).
-    gamma = 0.9
-    ambiguity = 0.0214 * np.sqrt(ACROSS**2 + AHEAD**2 + 2.0**2) / (2 * 0.3)
-    sigma = ambiguity / (2 * np.pi) * np.sqrt((1 - gamma**2) / (2 * LOOKS * gamma**2))
+    sigma = 0.01
     noise = np.random.default_rng(2).normal(size=ACROSS.shape) * sigma
-    found = detect(noise, coherence=gamma, noise_factor=factor)
-    np.testing.assert_allclose(found["height_noise"], sigma, rtol=0.01)
+    found = detect(noise, std=sigma, noise_factor=factor)
     rate = float((found["significant_height"] != 0).mean())
     expected = 2 * norm.sf(factor)
     # Binomial scatter, four of it, and 1 % of the noise in the exponent.
@@ -109,27 +94,32 @@ def test_noise_alone_gives_the_expected_rate_of_alarms(detect, factor):
     assert rate == pytest.approx(expected, abs=4 * np.sqrt(expected / count) + slack)
 
 
-def test_the_dark_is_unknown_whatever_its_height(detect):
-    dark = inside(0, 12, 1.2, 1.6)
+def test_what_is_not_valid_is_unknown_whatever_its_height(detect):
+    lost = inside(0, 12, 1.2, 1.6)
     height = np.where(inside(0, 12, 0.6, 0.6), 0.4, 0.0)
-    found = detect(height, power=np.where(dark, 0.01, 1.0))
+    found = detect(height, kind=np.where(lost, SHADOW, VALID))
     kind = found["map_class"].values
     assert found.sizes["detection"] == 0
-    assert (kind[inside(0, 12, 0.8, 1.2)] == detection.UNKNOWN).all()
-    # A window's half away it is as it was, but for some dark speckle.
-    assert (kind[~inside(0, 12, 1.5, 1.9)] == detection.UNKNOWN).mean() < 0.02
+    np.testing.assert_array_equal(kind == detection.UNKNOWN, lost)
+    assert (kind[~lost] == detection.FREE).all()
+
+
+def test_without_valid_heights_everything_is_unknown(detect, caplog):
+    found = detect(np.zeros(ACROSS.shape), kind=UNCERTAIN_CYCLE)
+    assert (found["map_class"] == detection.UNKNOWN).all()
+    assert found.sizes["detection"] == 0
+    assert "fewer than three heights are valid" in caplog.text
 
 
 def test_ground_too_noisy_to_tell_is_unknown_and_a_tall_obstacle_on_it_is_one(detect):
     noisy = inside(-1, 12, 1.0, 1.0)
     tall = inside(-1, 12, 0.4, 0.4)
-    # At a coherence of 0.5 three standard deviations are 0.14 m at 12 m: above 0.1, below 0.5 m.
-    found = detect(np.where(tall, 0.5, 0.0), coherence=np.where(noisy, 0.5, 0.999))
+    # Three standard deviations are 0.15 m: above 0.1, below 0.5 m.
+    found = detect(np.where(tall, 0.5, 0.0), std=np.where(noisy, 0.05, 0.001))
     kind = found["map_class"].values
-    assert 0.1 < 3 * found["height_noise"].values[noisy].min() < 0.5
     assert (kind[tall] == detection.OBSTACLE).all()
     assert (kind[noisy & ~tall] == detection.UNKNOWN).all()
-    assert (kind[~noisy] == detection.FREE).mean() > 0.98
+    assert (kind[~noisy] == detection.FREE).all()
 
 
 def test_a_bright_patch_alarms_the_image_and_not_the_heights(detect):
@@ -155,8 +145,7 @@ def test_the_plane_does_not_bend_under_objects_and_the_median_follows_rolling_gr
     # by the box, a sixth of the window: a twelfth of what the slope of 0.38 rises in it, 3 cm.
     assert np.abs(found - rolling)[15:-15].max() < 0.05
     assert np.abs(detection.ground(rolling, X, Y, None) - rolling).max() > 0.2
-    with pytest.raises(ValueError, match=r"fewer than three cells .* detection\.shadow_level_db"):
-        detection.ground(np.full((4, 4), np.nan), X[:4], Y[:4], None)
+    assert np.isnan(detection.ground(np.full((4, 4), np.nan), X[:4], Y[:4], None)).all()
 
 
 def test_the_running_median_is_the_median_of_its_window():

@@ -20,7 +20,6 @@ OPTIONS = Detection(
     ground_window_m=None,
     multilook_window_m=0.2,
     background_window_m=3.0,
-    shadow_level_db=-4.0,
     amplitude_threshold_db=6.0,
 )
 X, Y = np.arange(-20, 21) * 0.1, 10 + np.arange(31) * 0.1
@@ -51,7 +50,7 @@ def evaluate(height=(), contrast=(), kind=None, objects=OBJECTS):
     empty = np.zeros(0)
     detections = variables.dataset(
         "detections",
-        {name: np.zeros(shape) for name in ("ground", "height_above_ground", "height_noise")}
+        {name: np.zeros(shape) for name in ("ground", "height_above_ground")}
         | {
             "significant_height": fields[0],
             "contrast": fields[1],
@@ -142,7 +141,7 @@ def swept(*cases):
         for name in cases[0].data_vars
     }
     for name, variable in SWEEP.items():
-        sizes = {"region": 3, "channel": 2, "ground_axis": 2}
+        sizes = {"region": 4, "channel": 2, "ground_axis": 2}
         data[name] = np.ones((len(cases), 1, *(sizes[dim] for dim in variable.dims)))
     axis = (0.01 * np.arange(len(cases)), {"long_name": "scene.roughness_std_m"})
     coords = {name: cases[0][name].values for name in cases[0].coords if name not in "xy"}

@@ -185,14 +185,12 @@ def test_dem_coding_moves_heights_in_x_and_y(turn):
 def test_inversion_gives_the_height_at_the_pixel_for_any_baseline(ideal_phase, upper):
     unwrapped, images = ideal_phase(hill, X, Y, upper=upper, constant=5.0)
     dem = height.invert(unwrapped, images, np.full(GRID_X.shape, -5.0))
-    image_height = dem["image_height"].values
+    image_height = dem.image_height
     true_y = geometry.circle_true_y(GRID_Y, image_height, 2.0)
     np.testing.assert_allclose(image_height, hill(GRID_X, true_y), atol=1e-9)
     ranges = [geometry.slant_range(place, GRID_X, GRID_Y) for place in ((0, 0, 2.0), upper)]
     flat_earth = -4 * np.pi * (ranges[0] - ranges[1]) / 0.0214
-    np.testing.assert_allclose(
-        dem["absolute_phase"], unwrapped["phase"].values - 5.0 + flat_earth, atol=1e-9
-    )
+    np.testing.assert_allclose(dem.phase, unwrapped["phase"].values - 5.0 + flat_earth, atol=1e-9)
 
 
 def test_a_rail_beside_and_before_the_origin_is_inverted_from_its_own_place(ideal_phase):
@@ -201,7 +199,7 @@ def test_a_rail_beside_and_before_the_origin_is_inverted_from_its_own_place(idea
     dem = height.invert(unwrapped, images, np.zeros(GRID_X.shape))
     # Linear interpolation along y over 5 cm: 0.2 / 0.09 x 0.05^2 / 8 < 1 mm.
     inside = GRID_Y < 10.8
-    error = np.abs(dem["height"].values - hill(GRID_X, GRID_Y))[inside]
+    error = np.abs(dem.height - hill(GRID_X, GRID_Y))[inside]
     assert error.max() < 1e-3
 
 
@@ -210,5 +208,5 @@ def test_cells_without_a_height_are_logged(ideal_phase, caplog):
     unwrapped["phase"].values[:, 4] = 1e6
     with caplog.at_level(logging.INFO):
         dem = height.invert(unwrapped, images, np.zeros(GRID_X.shape))
-    assert np.isnan(dem["height"].values[:, 4]).all()
+    assert np.isnan(dem.height[:, 4]).all()
     assert "61 of 1281 cells of the DEM have no height" in caplog.text

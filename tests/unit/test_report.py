@@ -83,14 +83,16 @@ def accuracy() -> Any:
     data: dict[str, Any] = {
         "height_error": error,
         "shadow": np.array([[False, False], [True, False]]),
+        "delivered": np.array([[True, True], [False, False]]),
         "tolerance": 0.05,
     }
     for number, name in enumerate(variables.PRODUCTS["accuracy"]):
         if name not in data:
-            data[name] = np.array([0.01, 0.02, 0.03]) * (number + 1)
-    data["cell_count"] = np.array([4, 3, 1])
+            data[name] = np.array([0.01, 0.02, 0.03, 0.005]) * (number + 1)
+    data["cell_count"] = np.array([4, 3, 1, 3])
+    data["hidden_delivered"], data["visible_withheld"] = 0.01, 0.04
     axis = np.array([0.0, 0.1])
-    regions = np.array(["whole_scene", "visible_ground", "shadow"])
+    regions = np.array(["whole_scene", "visible_ground", "shadow", "delivered"])
     return variables.dataset("accuracy", data, {"x": axis, "y": axis, "region": regions})
 
 
@@ -200,6 +202,7 @@ def test_accuracy_claims_and_provenance_say_what_they_were_given(accuracy: Any) 
         "summary", "radar", "chain", "accuracy", "claims", "errata", "times", "provenance",
     ]  # fmt: skip
     assert [row[:2] for row in table(found, "accuracy").rows] == [
+        ("delivered", "3"),
         ("whole scene", "4"),
         ("visible ground", "3"),
         ("shadow", "1"),

@@ -34,17 +34,19 @@ def of(values, method, **options):
 
 def test_an_average_of_independent_pixels_leaves_one_over_their_number():
     shape = (20, 23)
-    found = of(np.ones(shape, complex), "boxcar").gain(white(shape), shape, 1.0)
+    found = of(np.ones(shape, complex), "boxcar").gain(white(shape), shape, (1.0, 1.0))
     # sinc of a million cells is 3e-7 at most.
-    np.testing.assert_allclose(found, 1 / 25, rtol=1e-5)
-    none = of(np.ones(shape, complex), "none").gain(white(shape), shape, 1.0)
+    np.testing.assert_allclose(found[2:-2, 2:-2], 1 / 25, rtol=1e-5)
+    # At a corner three by three are left.
+    assert found[0, 0] == pytest.approx(1 / 9, rel=1e-5)
+    none = of(np.ones(shape, complex), "none").gain(white(shape), shape, (1.0, 1.0))
     np.testing.assert_array_equal(none, 1)
 
 
 def test_an_average_of_fine_pixels_is_the_double_sum_over_their_correlation():
     shape, spacing = (9, 9), 0.4
     noise = white(shape, coherence=0.8, resolution=1.0, fringes=0.1)
-    found = of(np.ones(shape, complex), "boxcar").gain(noise, shape, spacing)[4, 4]
+    found = of(np.ones(shape, complex), "boxcar").gain(noise, shape, (spacing, spacing))[4, 4]
     place = (np.arange(5) - 2) * spacing
     at = np.stack(np.meshgrid(place, place), axis=-1).reshape(-1, 2)
     total = 0.0
@@ -82,7 +84,7 @@ def test_goldstein_leaves_of_noise_what_its_weights_leave():
     rng = np.random.default_rng(2)
     shape = (40, 40)
     filter_ = of(2 + speckle(rng, shape), "goldstein")
-    gain = filter_.gain(white(shape), shape, 1.0)
+    gain = filter_.gain(white(shape), shape, (1.0, 1.0))
     draws = np.array([filter_.apply(speckle(rng, shape)) for _ in range(300)])
     inner = np.s_[8:-8, 8:-8]
     # 300 draws of 24 x 24 pixels, some 40 of them independent: 3 standard errors are 3 %. Patches
@@ -93,9 +95,13 @@ def test_goldstein_leaves_of_noise_what_its_weights_leave():
 
 def test_the_mean_of_a_rectangle_has_its_cells_as_looks():
     noise = white((1, 1), resolution=0.1).at(np.ix_([0], [0]))
-    assert response.rectangle_gain(noise, (4, 6), 1.0) == pytest.approx(1 / 24, rel=1e-6)
+    assert response.rectangle_gain(noise, (4, 6), (1.0, 1.0)) == pytest.approx(1 / 24, rel=1e-6)
+
+
+def test_every_filter_has_a_response():
+    assert response.RESPONSES.keys() == filtering.FILTERS.keys()
 
 
 def test_an_unknown_filter_is_refused():
-    with pytest.raises(ValueError, match="'wavelet' is not known"):
+    with pytest.raises(ValueError, match="no response of a filter 'wavelet'"):
         of(np.ones((4, 4)), "wavelet")

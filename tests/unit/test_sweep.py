@@ -78,7 +78,7 @@ def test_swept_keys_are_dimensions_with_values_and_units(tiny, swept):
     assert swept["point_gain"].dims == (*dims, "channel")
     assert list(swept["motion_axis"].values) == ["y", "z"]
     assert list(swept["motion_level_wavelengths"].values) == [0, 0.1]
-    assert list(swept["region"].values) == ["whole_scene", "visible_ground", "shadow"]
+    assert list(swept["region"].values) == ["whole_scene", "visible_ground", "shadow", "delivered"]
     assert swept["motion_level_wavelengths"].attrs == {
         "long_name": "motion.level_wavelengths",
         "units": "1",
@@ -97,7 +97,8 @@ def test_every_statistic_is_there_with_its_unit(swept, tiny):
     of_regions = {str(name) for name in accuracy.data_vars if accuracy[name].dims == ("region",)}
     assert of_regions - {"cell_count"} == STATISTICS
     focus = {"point_gain", "peak_gain", "peak_shift"}
-    assert set(swept.data_vars) == STATISTICS | {"coherence", "residues"} | focus
+    others = {"coherence", "residues", "hidden_delivered", "visible_withheld"}
+    assert set(swept.data_vars) == STATISTICS | others | focus
     for name in STATISTICS:
         assert swept[name].attrs == accuracy[name].attrs
 

@@ -26,7 +26,7 @@ def sweep(study):
     count = len(study.sweeps["systems"].over["radar"])
     data = {}
     for name, variable in SWEEP.items():
-        trailing = [{"region": 3, "channel": 2, "ground_axis": 2}[dim] for dim in variable.dims]
+        trailing = [{"region": 4, "channel": 2, "ground_axis": 2}[dim] for dim in variable.dims]
         values = np.arange(count).reshape(count, 1, *[1] * len(trailing))
         values = np.broadcast_to(values, (count, 2, *trailing))
         data[name] = values if name == "residues" else values / 100

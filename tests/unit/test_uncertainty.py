@@ -7,7 +7,7 @@ import pytest
 
 from vinsar.processing import response, uncertainty
 
-SPACING = 1.0
+SPACING = 1.0, 1.0
 NONE = {"method": "none", "goldstein_alpha": 0.8, "goldstein_patch_px": 16, "boxcar_window_px": 5}
 
 
@@ -24,8 +24,8 @@ def estimate(images, phase=0.0):
         images,
         np.broadcast_to(np.asarray(phase, float), shape),
         np.zeros(shape),
-        resolution=np.full((2, *shape), SPACING),
-        spacing_m=SPACING,
+        resolution=np.ones((2, *shape)),
+        spacing=SPACING,
         relative_bandwidth=0.1,
     )
 
@@ -43,7 +43,7 @@ def test_intervals_of_a_single_look_hold_what_they_say(coherence):
     images = pair(np.random.default_rng(5), (150, 150), coherence)
     product = images[0] * np.conj(images[1])
     variance = uncertainty.noise_variance(
-        estimate(images), response.of(product, **NONE), product, product, spacing_m=SPACING
+        estimate(images), response.of(product, **NONE), product, product, spacing=SPACING
     )
     error = np.abs(np.angle(product)) / np.sqrt(variance)
     # Binomial: 3 sqrt(0.683 * 0.317 / 22 500) = 0.9 %; the von Mises distribution of a dark pixel
@@ -56,7 +56,7 @@ def test_a_pixel_without_signal_has_no_phase():
     images = np.zeros((2, 12, 12), complex)
     product = images[0]
     variance = uncertainty.noise_variance(
-        estimate(images), response.of(product, **NONE), product, product, spacing_m=SPACING
+        estimate(images), response.of(product, **NONE), product, product, spacing=SPACING
     )
     np.testing.assert_allclose(variance, np.pi**2 / 3)
 
@@ -69,7 +69,7 @@ def test_smoothing_of_a_ramp_is_nothing_and_of_a_parabola_its_curvature():
 
     def smoothed(phase):
         product = np.exp(1j * np.broadcast_to(phase, (80, 80)))
-        found = uncertainty.smoothing(filter_, product, resolution=resolution, spacing_m=1.0)
+        found = uncertainty.smoothing(filter_, product, resolution=resolution, spacing=SPACING)
         return found[inner]
 
     np.testing.assert_allclose(smoothed(0.02 * line), 0, atol=1e-6)
@@ -83,33 +83,38 @@ def test_smoothing_of_a_ramp_is_nothing_and_of_a_parabola_its_curvature():
 def test_the_reference_errs_as_its_looks_do_and_as_its_ground_does():
     rng = np.random.default_rng(6)
     shape, coherence = (40, 40), 0.8
-    where = [(slice(5, 11), slice(5, 11)), (slice(5, 11), slice(29, 35))]
-    level = np.zeros(shape)
-    told, found = [], []
-    for _ in range(150):
-        images = pair(rng, shape, coherence)
+    where = np.s_[5:11, 5:17]
+    level = np.full(shape, 0.3)
+
+    def told(images):
         product = images[0] * np.conj(images[1])
-        noise = estimate(images)
-        told.append(uncertainty.reference_variance(noise, product, where, level, spacing_m=SPACING))
-        found.append(np.mean([np.angle(product[part].mean()) for part in where]))
+        return product, uncertainty.reference_variance(
+            estimate(images), product, level, where, spacing=SPACING
+        )
+
+    variances, found = [], []
+    for _ in range(150):
+        product, variance = told(pair(rng, shape, coherence, phase=0.3))
+        variances.append(variance)
+        found.append(np.angle(product[where].mean()))
     # 72 looks; 150 draws have their standard deviation to 3 / sqrt(300) = 17 %. What chance makes
     # of uneven ground is told on top of it.
     assert np.std(found) == pytest.approx(np.sqrt(0.36 / 2 / 0.64 / 72), rel=0.17)
-    assert 0.83 * np.std(found) < np.sqrt(np.mean(told)) < 1.6 * np.std(found)
-    # A step of a radian through both: no better known than half of it over the root of two.
-    uneven = images * np.exp(1j * (np.arange(40)[:, None] >= 8) * np.array([0, -1])[:, None, None])
-    product = uneven[0] * np.conj(uneven[1])
-    rough = uncertainty.reference_variance(
-        estimate(uneven), product, where, level, spacing_m=SPACING
-    )
-    assert rough > 4 * np.mean(told)
+    assert 0.83 * np.std(found) < np.sqrt(np.mean(variances)) < 1.7 * np.std(found)
+    # A step of a radian through it is no better known than half of it.
+    step = np.where(np.arange(40)[:, None] >= 8, 1.0, 0.0) + np.zeros(shape)
+    _, rough = told(pair(rng, shape, coherence, phase=step))
+    assert rough > 0.1
 
 
 def test_windows_hold_the_looks_that_they_are_asked_for():
     resolution = np.stack([np.full((3, 3), 0.18), np.full((3, 3), 0.075)])
     for looks in (9, 42, 85):
-        side = uncertainty.window(looks, resolution, 0.01)
-        assert side % 2 == 1
+        rows, columns = uncertainty.window(looks, resolution, (0.02, 0.01))
+        assert rows % 2 == columns % 2 == 1
         # An odd number of pixels is within one of what is asked for.
-        assert side * 0.01 == pytest.approx(np.sqrt(looks * 0.18 * 0.075), abs=0.01)
-    assert uncertainty.window(1, resolution, 5.0) == 1
+        assert rows * 0.01 == pytest.approx(np.sqrt(looks * 0.18 * 0.075), abs=0.01)
+        assert columns * 0.02 == pytest.approx(np.sqrt(looks * 0.18 * 0.075), abs=0.02)
+    assert uncertainty.window(1, resolution, (5.0, 5.0)) == (1, 1)
+    rows, columns = uncertainty.window(36, resolution, (0.01, 0.01), elongation=4)
+    assert rows == pytest.approx(4 * columns, abs=4)

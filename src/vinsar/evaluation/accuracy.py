@@ -1,4 +1,8 @@
-"""Height errors and their statistics, for the whole scene, visible ground and shadow."""
+"""Height errors and their statistics: the whole scene, visible ground, shadow, what is delivered.
+
+Delivered are the cells that the processing itself takes for valid. What their standard deviations
+promise is held against the errors, and what they leave out against what is truly hidden.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import REGIONS
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
+from vinsar.processing.classification import VALID
 from vinsar.simulation.visibility import SHADOW
 
 if TYPE_CHECKING:
@@ -25,18 +30,37 @@ _STATISTICS = (
     "std",
     "median",
     "mad",
+    "percentile_90_absolute",
     "percentile_95_absolute",
     "maximum_absolute",
+)
+
+_SHARES = (
+    "fraction_within_tolerance",
+    "fraction_reconstructed",
+    "coverage_1_sigma",
+    "coverage_2_sigma",
+    "share_of_scene",
 )
 
 
 VARIABLES = {
     "height_error": Variable(GRID, "real", "m", "height error, reconstructed minus true"),
     "shadow": SHADOW,
+    "delivered": Variable(
+        GRID,
+        "flag",
+        "1",
+        "whether the height is delivered as valid",
+        flag_meanings="withheld delivered",
+    ),
     "mean": Variable(("region",), "real", "m", "mean height error"),
     "std": Variable(("region",), "real", "m", "standard deviation of the height error"),
     "median": Variable(("region",), "real", "m", "median height error"),
     "mad": Variable(("region",), "real", "m", "median absolute deviation of the height error"),
+    "percentile_90_absolute": Variable(
+        ("region",), "real", "m", "90th percentile of the absolute height error (LE90)"
+    ),
     "percentile_95_absolute": Variable(
         ("region",), "real", "m", "95th percentile of the absolute height error"
     ),
@@ -49,6 +73,33 @@ VARIABLES = {
     ),
     "fraction_reconstructed": Variable(
         ("region",), "real", "1", "share of the region's cells that have a height"
+    ),
+    "coverage_1_sigma": Variable(
+        ("region",),
+        "real",
+        "1",
+        "share of the heights with an error within their standard deviation",
+        "68.3 % of a normal distribution",
+    ),
+    "coverage_2_sigma": Variable(
+        ("region",),
+        "real",
+        "1",
+        "share of the heights with an error within twice their standard deviation",
+        "95.4 % of a normal distribution",
+    ),
+    "share_of_scene": Variable(
+        ("region",), "real", "1", "share of the scene's cells that are in the region"
+    ),
+    "hidden_delivered": Variable(
+        (),
+        "real",
+        "1",
+        "share of the hidden ground that is delivered as valid",
+        "ground a cell or more inside the shadow",
+    ),
+    "visible_withheld": Variable(
+        (), "real", "1", "share of the visible ground that is not delivered"
     ),
     "cell_count": Variable(("region",), "integer", "1", "number of cells in the region"),
     "tolerance": Variable((), "real", "m", "height error that counts as within"),
@@ -77,10 +128,10 @@ def statistics(error: NDArray[np.floating], tolerance_m: float) -> dict[str, flo
     Returns
     -------
     dict
-        Mean, std, median, MAD, 95th percentile and maximum of the absolute error, in metres, over
-        the cells with a height; the share of cells with a height; the share of all cells within
-        the tolerance (a cell without a height is not); and the number of cells. NaN where there is
-        nothing to count.
+        Mean, std, median, MAD, 90th and 95th percentile and maximum of the absolute error, in
+        metres, over the cells with a height; the share of cells with a height; the share of all
+        cells within the tolerance (a cell without a height is not); and the number of cells. NaN
+        where there is nothing to count.
     """
     known = error[np.isfinite(error)]
     absolute = np.abs(known)
@@ -92,6 +143,7 @@ def statistics(error: NDArray[np.floating], tolerance_m: float) -> dict[str, flo
             "std": known.std(),
             "median": median,
             "mad": np.median(np.abs(known - median)),
+            "percentile_90_absolute": np.percentile(absolute, 90),
             "percentile_95_absolute": np.percentile(absolute, 95),
             "maximum_absolute": absolute.max(),
         }
@@ -100,6 +152,31 @@ def statistics(error: NDArray[np.floating], tolerance_m: float) -> dict[str, flo
     result["fraction_within_tolerance"] = within / cells if cells else np.nan
     result["fraction_reconstructed"] = known.size / cells if cells else np.nan
     return {name: float(value) for name, value in result.items()} | {"cell_count": cells}
+
+
+def coverage(error: NDArray[np.floating], std: NDArray[np.floating]) -> dict[str, float]:
+    """Return the shares of errors within one and two of their standard deviations.
+
+    Parameters
+    ----------
+    error, std
+        Height errors and their standard deviations (cell,), m; NaN where there is no height.
+
+    Returns
+    -------
+    dict
+        Both shares of the cells with a height; NaN where there is none.
+    """
+    known = np.isfinite(error) & np.isfinite(std)
+    ratio = np.abs(error[known]) / np.maximum(std[known], np.finfo(float).tiny)
+    return {
+        f"coverage_{times}_sigma": float((ratio <= times).mean()) if ratio.size else np.nan
+        for times in (1, 2)
+    }
+
+
+def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+    return float(part[whole].mean()) if whole.any() else np.nan
 
 
 def evaluate(dem: xr.Dataset, truth: xr.Dataset, *, tolerance_m: float) -> xr.Dataset:
@@ -122,6 +199,8 @@ def evaluate(dem: xr.Dataset, truth: xr.Dataset, *, tolerance_m: float) -> xr.Da
     ValueError
         If the grids differ.
     """
+    from scipy.ndimage import binary_erosion
+
     for axis in ("x", "y"):
         ours, theirs = dem[axis].values, truth[axis].values
         if ours.shape != theirs.shape or not np.allclose(ours, theirs, rtol=0, atol=1e-9):
@@ -132,12 +211,34 @@ def evaluate(dem: xr.Dataset, truth: xr.Dataset, *, tolerance_m: float) -> xr.Da
     error = dem["height"].values - truth["height"].values
     shadow = truth["shadow"].values
     exists = np.isfinite(truth["height"].values)
-    parts = {"whole_scene": exists, "visible_ground": exists & ~shadow, "shadow": exists & shadow}
-    rows = [statistics(error[parts[region]], tolerance_m) for region in REGIONS]
+    valid = dem["height_class"].values == VALID
+    parts = {
+        "whole_scene": exists,
+        "visible_ground": exists & ~shadow,
+        "shadow": exists & shadow,
+        "delivered": exists & valid,
+    }
+    std = dem["height_std"].values
+    rows = [
+        statistics(error[parts[region]], tolerance_m)
+        | coverage(error[parts[region]], std[parts[region]])
+        | {"share_of_scene": _share(parts[region], exists)}
+        for region in REGIONS
+    ]
     table = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    # Beyond the edge of the scene everything may be hidden.
+    inside = binary_erosion(shadow, np.ones((3, 3), bool), border_value=1)
     return variables.dataset(
         "accuracy",
-        {"height_error": error, "shadow": shadow, "tolerance": tolerance_m} | table,
+        {
+            "height_error": error,
+            "shadow": shadow,
+            "delivered": parts["delivered"],
+            "tolerance": tolerance_m,
+            "hidden_delivered": _share(valid, inside & exists),
+            "visible_withheld": _share(~valid, parts["visible_ground"]),
+        }
+        | table,
         {"x": dem["x"].values, "y": dem["y"].values, "region": np.array(REGIONS)},
     )
 
@@ -153,15 +254,18 @@ def summary(accuracy: xr.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict
-        The tolerance, and a dictionary of statistics for each region; None where undefined.
+        The tolerance, what is hidden and yet delivered and visible and withheld, and a dictionary
+        of statistics for each region; None where undefined.
     """
     result: dict[str, Any] = {"tolerance_m": float(accuracy["tolerance"])}
+    for name in ("hidden_delivered", "visible_withheld"):
+        result[name] = _number(accuracy[name])
     for region in REGIONS:
         part = accuracy.sel(region=region)
         row: dict[str, Any] = {}
         for name in _STATISTICS:
             row[f"{name}_error_m"] = _number(part[name])
-        for name in ("fraction_within_tolerance", "fraction_reconstructed"):
+        for name in _SHARES:
             row[name] = _number(part[name])
         row["cell_count"] = int(part["cell_count"])
         result[region] = row

@@ -13,5 +13,5 @@ CHANNELS: Final = ("lower", "upper")
 AXES: Final = ("x", "y", "z")
 """Right-handed axes in metres: x along the rail, y forward, z up."""
 
-REGIONS: Final = ("whole_scene", "visible_ground", "shadow")
+REGIONS: Final = ("whole_scene", "visible_ground", "shadow", "delivered")
 """The parts of the scene whose height errors are told apart."""

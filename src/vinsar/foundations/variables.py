@@ -54,7 +54,8 @@ class Variable:
     comment
         Sign convention and meaning, where they matter.
     flag_meanings
-        For flags: the words for false and true.
+        For flags: the words for false and true. For integers that are classes: the words for 0, 1
+        and so on.
     """
 
     dims: tuple[str, ...]
@@ -65,9 +66,9 @@ class Variable:
     flag_meanings: str = ""
 
     @property
-    def attrs(self) -> dict[str, str]:
+    def attrs(self) -> dict[str, Any]:
         """The attributes that the variable carries."""
-        attrs = {"long_name": self.long_name}
+        attrs: dict[str, Any] = {"long_name": self.long_name}
         if self.units:
             attrs["units"] = self.units
         if self.comment:

@@ -69,7 +69,7 @@ _HIDDEN = 2.0
 _TINY = float(np.finfo(float).tiny)
 
 
-def shadow(product: Complexes, *, resolution: Floats, spacing_m: float) -> Flags:
+def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, float]) -> Flags:
     """Return which pixels are dark against their surroundings.
 
     Windows whose coherent power is 6 dB down, without the lit pixels at their edges. The coherent
@@ -81,8 +81,8 @@ def shadow(product: Complexes, *, resolution: Floats, spacing_m: float) -> Flags
         Interferogram (y, x), unfiltered.
     resolution
         Resolution in x and y (2, y, x), m.
-    spacing_m
-        Spacing of the pixels, m.
+    spacing
+        Spacing of the pixels in x and y, m.
 
     Returns
     -------
@@ -91,40 +91,40 @@ def shadow(product: Complexes, *, resolution: Floats, spacing_m: float) -> Flags
     """
     from scipy.ndimage import binary_propagation
 
-    def side(looks: float) -> int:
-        return uncertainty.window(looks, resolution, spacing_m)
-
-    narrow = _SHADOW_LOOKS / _ELONGATION
     shapes = [
-        (side(_SHADOW_LOOKS), side(_SHADOW_LOOKS)),
-        (side(narrow * _ELONGATION**2), side(narrow)),
+        uncertainty.window(_SHADOW_LOOKS, resolution, spacing, elongation=longer)
+        for longer in (1, _ELONGATION)
     ]
     powers = [np.abs(uncertainty.mean(product, shape)) for shape in shapes]
     usual = np.maximum(
-        _surroundings(powers[0], side(_SURROUNDINGS_LOOKS)),
+        _surroundings(powers[0], uncertainty.window(_SURROUNDINGS_LOOKS, resolution, spacing)),
         max(_LEAST_BACKGROUND * float(np.median(powers[0])), _TINY),
     )
     dark = np.zeros(product.shape, bool)
     for power, shape in zip(powers, shapes, strict=True):
         dark |= grow(power < _SHADOW * usual, shape)
-    edge = side(_EDGE_LOOKS)
+    edge = uncertainty.window(_EDGE_LOOKS, resolution, spacing)
     lit = np.abs(uncertainty.mean(product, edge)) > _EDGE * usual
     return np.asarray(~binary_propagation(~dark, mask=~dark | lit))
 
 
-def _surroundings(values: Floats, window_px: int) -> Floats:
-    """Return the median of a square window around each pixel, from a few of its values."""
+def _surroundings(values: Floats, window_px: tuple[int, int]) -> Floats:
+    """Return the median of a window around each pixel, from a few of its values."""
     from scipy.ndimage import map_coordinates, median_filter
 
-    step = max(1, window_px // _NODES)
-    few = median_filter(values[::step, ::step], 2 * (window_px // step // 2) + 1, mode="reflect")
+    down, across = (max(1, side // _NODES) for side in window_px)
+    sides = [
+        2 * (side // step // 2) + 1 for side, step in zip(window_px, (down, across), strict=True)
+    ]
+    few = median_filter(values[::down, ::across], sides, mode="reflect")
+    rows, columns = np.indices(values.shape)
     return np.asarray(
-        map_coordinates(few, np.indices(values.shape) / step, order=1, mode="nearest")
+        map_coordinates(few, [rows / down, columns / across], order=1, mode="nearest")
     )
 
 
-def grow(mask: Flags, shape: int | tuple[int, int]) -> Flags:
-    """Return a mask grown by a window around each of its cells, of sides odd in number."""
+def grow(mask: Flags, shape: tuple[int, int]) -> Flags:
+    """Return a mask grown by a window (rows, columns) of odd sides around each of its cells."""
     from scipy.ndimage import maximum_filter
 
     return np.asarray(maximum_filter(mask.view(np.int8), shape, mode="constant").view(bool))
@@ -188,8 +188,8 @@ def split_band(
     """
     from scipy.ndimage import uniform_filter
 
-    spacing = float(y[1] - y[0])
-    if spacing >= float(resolution[1].min()):
+    spacing = float(x[1] - x[0]) if x.size > 1 else 1.0, float(y[1] - y[0])
+    if spacing[1] >= float(resolution[1].min()):
         none = Cycles(np.zeros(phase.shape), np.full(phase.shape, np.inf))
         return [none for _ in SPLIT_LOOKS]
     shares = np.array([-1.0, 1.0]) * relative_bandwidth / 3
@@ -197,11 +197,14 @@ def split_band(
     for image, part in zip(images, antennas, strict=True):
         # In y a pixel turns by the carrier's path; without that the band lies around 0.
         carrier = np.exp(-2j * np.pi / wavelength_m * aperture.path(part, x[None, :], y[:, None]))
-        parts.append(_outer_thirds(image * carrier, spacing, resolution[1].mean(axis=0), carrier))
+        parts.append(
+            _outer_thirds(image * carrier, spacing[1], resolution[1].mean(axis=0), carrier)
+        )
     result = []
     for looks in SPLIT_LOOKS:
         side = uncertainty.window(looks, resolution, spacing)
-        cells = (side * spacing) ** 2 / (3 * resolution[0] * resolution[1])
+        area = side[0] * spacing[1] * side[1] * spacing[0]
+        cells = area / (3 * resolution[0] * resolution[1])
         covered = uniform_filter(np.ones(phase.shape), side, mode="constant")
         sums, variance = [], np.zeros(phase.shape)
         for lower, upper, share in zip(*parts, shares, strict=True):
@@ -237,7 +240,7 @@ def _outer_thirds(
     ]
 
 
-def _total(values: NDArray[Any], side: int) -> NDArray[Any]:
+def _total(values: NDArray[Any], side: tuple[int, int]) -> NDArray[Any]:
     from scipy.ndimage import uniform_filter
 
     if np.iscomplexobj(values):
@@ -367,7 +370,7 @@ class Fan:
 
 
 def uncertain_cycles(
-    cycles: Sequence[Cycles], dark: Flags, too_low: Flags, *, window_px: int
+    cycles: Sequence[Cycles], dark: Flags, too_low: Flags, *, window_px: tuple[int, int]
 ) -> Flags:
     """Return where the phase contradicts the band, or stands too low before its shadow.
 
@@ -380,7 +383,7 @@ def uncertain_cycles(
     too_low
         Cells before a shadow that is too long for them.
     window_px
-        Side of the band's first window, pixels.
+        Rows and columns of the band's first window.
 
     Returns
     -------
@@ -390,9 +393,10 @@ def uncertain_cycles(
     from scipy.ndimage import binary_propagation
 
     found = np.zeros(dark.shape, bool)
-    near = 2 * window_px - 1
+    rows, columns = window_px
+    near = 2 * rows - 1, 2 * columns - 1
     # Backwards from the shadow, as deep as what stands there may be.
-    deep = 4 * window_px + 1, 2 * (window_px // 4) + 1
+    deep = 4 * rows + 1, 2 * (columns // 4) + 1
     for sign in (-1, 1):
         first = sign * cycles[0].missing
         probable = ~dark & (first > np.maximum(_GROWN_CYCLES, _GROWN_SIGNIFICANT * cycles[0].std))
@@ -405,10 +409,10 @@ def uncertain_cycles(
             likely = ~dark & (first > _BEFORE_SHADOW)
             seeds = too_low & likely
             found |= binary_propagation(seeds, mask=likely & grow(too_low, deep))
-    return np.asarray(grow(found, 2 * (window_px // 5) + 1) & ~dark)
+    return np.asarray(grow(found, (2 * (rows // 5) + 1, 2 * (columns // 5) + 1)) & ~dark)
 
 
-def islands(valid: Flags, reference: Flags, cycles: Cycles, *, window_px: int) -> Flags:
+def islands(valid: Flags, reference: Flags, cycles: Cycles, *, window_px: tuple[int, int]) -> Flags:
     """Return valid cells that no valid cells connect with the height reference.
 
     Where the band confirms their cycle at two standard deviations they stay.
@@ -422,7 +426,7 @@ def islands(valid: Flags, reference: Flags, cycles: Cycles, *, window_px: int) -
     cycles
         What the band says of each cell.
     window_px
-        Side of the band's window, pixels.
+        Rows and columns of the band's window.
 
     Returns
     -------
@@ -438,7 +442,7 @@ def islands(valid: Flags, reference: Flags, cycles: Cycles, *, window_px: int) -
         if number in held:
             continue
         area = areas == number
-        windows = max(1.0, area.sum() / window_px**2)
+        windows = max(1.0, area.sum() / (window_px[0] * window_px[1]))
         off = abs(float(cycles.missing[area].mean()))
         error = float(cycles.std[area].mean()) / np.sqrt(windows)
         if not off + 2 * error < 0.5:
@@ -481,7 +485,7 @@ def classify(
     antennas: Sequence[Floats],
     x: Floats,
     y: Floats,
-    window_px: int,
+    window_px: tuple[int, int],
 ) -> NDArray[np.int8]:
     """Return the class of each cell of a DEM.
 
@@ -504,11 +508,11 @@ def classify(
     reference
         Cells of the height reference.
     antennas
-        Centres of the apertures' lines (3,), m.
+        Places (3,) of the antennas before the image, m; without any, geometry says nothing.
     x, y
         Axes, m.
     window_px
-        Side of the band's first window, pixels.
+        Rows and columns of the band's first window.
 
     Returns
     -------
@@ -516,16 +520,23 @@ def classify(
         Index into `CLASSES`.
     """
     fans = [Fan.over(antenna, x, y) for antenna in antennas]
-    lowest = min(fans, key=lambda fan: float(fan.antenna[2]))
     outside = ~np.isfinite(height)
-    reach = max(1, window_px // 2) * float(y[1] - y[0])
-    low = lowest.too_low(dark, height, ambiguity, reach_m=reach)
+    reach = max(1, window_px[0] // 2) * float(y[1] - y[0])
+    low = np.zeros(height.shape, bool)
+    if fans:
+        lowest = min(fans, key=lambda fan: float(fan.antenna[2]))
+        low = lowest.too_low(dark, height, ambiguity, reach_m=reach)
     uncertain = uncertain_cycles(cycles, dark, low, window_px=window_px)
     incoherent = ~(variance <= _MOST_VARIANCE)
     known = ~(outside | dark | uncertain | incoherent | folded)
+    # Over a few looks: what single cells hide is noise.
+    side = 2 * (window_px[0] // 4) + 1, 2 * (window_px[1] // 4) + 1
+    share = uncertainty.mean(known, side)
+    smooth = uncertainty.mean(np.where(known, height, 0.0), side) / np.maximum(share, _TINY)
     hidden = np.zeros(height.shape, bool)
     for fan in fans:
-        hidden |= fan.line_of_sight(height, known) > height + _HIDDEN * std
+        hidden |= fan.line_of_sight(smooth, known) > smooth + _HIDDEN * std
+    hidden &= share > 0
     known &= ~hidden
     alone = islands(known, reference, cycles[0], window_px=window_px)
     result = np.full(height.shape, VALID, np.int8)

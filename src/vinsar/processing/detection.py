@@ -1,8 +1,8 @@
 """Obstacles and holes: alarms on the reconstructed heights, and on an image alone beside it.
 
-Heights tell what rises above the ground or falls below it. Where the image is dark, or the height
-too noisy to tell, the ground is unknown, not free. The 2-D detector is what a radar without
-interferometry has: what is brighter than its surroundings.
+Heights tell what rises above the ground or falls below it, by their standard deviation and class.
+Where they are not valid, or too noisy to tell, the ground is unknown, not free. The 2-D detector is
+what a radar without interferometry has: what is brighter than its surroundings.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from vinsar.foundations import variables
 from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import height, interferogram
-from vinsar.radar import aperture, geometry, speckle, trajectory
+from vinsar.processing.classification import VALID
+from vinsar.radar import geometry
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,12 +40,6 @@ _NODES = 12
 # Height that is representative of an area: what a tenth of its cells exceed.
 _PERCENTILE = 90
 
-# Step of the phase to differentiate by, rad.
-_PHASE_STEP = 1e-3
-
-# Below it a coherence says no more than that there is none.
-_LEAST_COHERENCE = 1e-2
-
 # Residuals below this do not gain weight in the fit of the ground, m.
 _LEAST_RESIDUAL_M = 1e-3
 
@@ -59,22 +53,20 @@ variables.declare(
         "height_above_ground": Variable(
             GRID, "real", "m", "reconstructed height above the ground beneath", "negative in holes"
         ),
-        "height_noise": Variable(
-            GRID, "real", "m", "standard deviation of the height expected from the coherence"
-        ),
         "significant_height": Variable(
             GRID,
             "real",
             "m",
             "height above the ground beneath where it exceeds its noise",
-            "0 where it does not, not a number where the image is dark",
+            "0 where it does not, not a number where the height is not valid",
         ),
         "map_class": Variable(
             GRID,
             "integer",
             "1",
             "what the ground is taken for",
-            "0 free, 1 obstacle, 2 hole, 3 unknown: dark, or too noisy to tell",
+            "unknown is what is not valid, or too noisy to tell",
+            flag_meanings="free obstacle hole unknown",
         ),
         "contrast": Variable(
             GRID,
@@ -114,8 +106,8 @@ class Detection(Section, name="detection"):
 
     threshold_m: float = key("height or depth from the ground that is an alarm", "ours", gt=0)
     noise_factor: float = key(
-        "an alarm exceeds as many standard deviations of the height's noise, as the coherence lets "
-        "expect it; where they exceed the threshold, the ground is unknown",
+        "an alarm exceeds as many standard deviations of the height; where they exceed the "
+        "threshold, the ground is unknown",
         "ours",
         gt=0,
     )
@@ -130,9 +122,6 @@ class Detection(Section, name="detection"):
     )
     background_window_m: float = key(
         "side of the window whose median power is that of the surroundings", "ours", gt=0
-    )
-    shadow_level_db: float = key(
-        "power relative to the surroundings below which the ground is unknown", "ours", lt=0
     )
     amplitude_threshold_db: float = key(
         "power relative to the surroundings that is an alarm of the image alone", "ours", gt=0
@@ -242,19 +231,15 @@ def ground(heights: Floats, x: Floats, y: Floats, window_m: float | None) -> Flo
     Returns
     -------
     ndarray, shape (y, x)
-        Heights of the ground, m.
-
-    Raises
-    ------
-    ValueError
-        If fewer than three heights are known.
+        Heights of the ground, m; not a number, with a warning in the log, if fewer than three
+        heights are known.
     """
     known = np.isfinite(heights)
     if known.sum() < 3:
-        raise ValueError(
-            "fewer than three cells have a height that is not in the dark: there is no ground to "
-            "find obstacles on; try a lower detection.shadow_level_db"
+        logger.warning(
+            "fewer than three heights are valid: there is no ground to find obstacles on"
         )
+        return np.full(heights.shape, np.nan)
     row, column = np.nonzero(known)
     constant, slope_x, slope_y = geometry.fit_plane(
         x[column], y[row] - y[0], heights[known], least_residual=_LEAST_RESIDUAL_M
@@ -269,40 +254,15 @@ def _ratio(decibel: float) -> float:
     return float(10 ** (decibel / 10))
 
 
-def _located(dem: xr.Dataset, images: xr.Dataset) -> tuple[Floats, Floats, Floats]:
-    """Return where the image's pixels belong, and how their height changes with the phase.
-
-    Returns
-    -------
-    tuple of ndarray, shape (y, x)
-        x and y, m; height by phase, m/rad.
-    """
-    x, y = dem["x"].values[None, :], dem["y"].values[:, None]
-    lower, upper = trajectory.apertures(images)
-    wavelength, phase = float(images["wavelength"]), dem["absolute_phase"].values
-    true_x, true_y, here = aperture.locate(lower, upper, x, y, phase, wavelength)
-    *_, higher = aperture.locate(lower, upper, x, y, phase + _PHASE_STEP, wavelength)
-    return true_x, true_y, (higher - here) / _PHASE_STEP
-
-
-def detect(
-    dem: xr.Dataset,
-    images: xr.Dataset,
-    interferogram: xr.Dataset,
-    *,
-    options: Detection,
-    looks: float,
-) -> xr.Dataset:
+def detect(dem: xr.Dataset, images: xr.Dataset, *, options: Detection) -> xr.Dataset:
     """Find obstacles and holes.
 
     Parameters
     ----------
-    dem, images, interferogram
+    dem, images
         Products of these names.
     options
         Section ``detection`` of the configuration.
-    looks
-        Independent looks of the coherence.
 
     Returns
     -------
@@ -312,33 +272,23 @@ def detect(
     from scipy.ndimage import uniform_filter
 
     x, y = dem["x"].values, dem["y"].values
-    true_x, true_y, height_by_phase = _located(dem, images)
-
-    def coded(values: Floats) -> Floats:
-        return height.code_dem(np.asarray(values, float), x, y, true_x=true_x, true_y=true_y)
-
     window = _window(options.multilook_window_m, x, y)
     power = (np.abs(images["image"].values) ** 2).mean(axis=0)
     intensity = uniform_filter(power, window, mode="nearest")
     surroundings = running_median(intensity, _window(options.background_window_m, x, y))
     contrast = intensity / np.maximum(surroundings, np.finfo(float).tiny)
-    found = dem["height"].values
     least = options.minimum_area_m2 / pixel_area(x, y)
-    # Speckle has dark spots of its own.
-    shaded, _ = regions(contrast < _ratio(options.shadow_level_db), least)
-    dark = ~(coded(np.where(shaded > 0, 1.0, 0.0)) < 0.5) | ~np.isfinite(found)
-    coherence = np.clip(interferogram["coherence"].values, _LEAST_COHERENCE, 1)
-    # The Cramer-Rao bound of the phase.
-    noise = coded(np.abs(height_by_phase) * speckle.phase_bound(coherence, looks))
-    surface = ground(np.where(dark, np.nan, found), x, y, options.ground_window_m)
+    found, valid = dem["height"].values, dem["height_class"].values == VALID
+    noise = options.noise_factor * dem["height_std"].values
+    surface = ground(np.where(valid, found, np.nan), x, y, options.ground_window_m)
     residual = found - surface
-    certain = ~dark & (np.abs(residual) > options.noise_factor * noise)
+    certain = valid & (np.abs(residual) > noise)
     # What is not certain is no alarm at any threshold.
-    significant = np.where(dark, np.nan, np.where(certain, residual, 0.0))
+    significant = np.where(valid, np.where(certain, residual, 0.0), np.nan)
     above, raised = regions(significant > options.threshold_m, least)
     below, sunk = regions(significant < -options.threshold_m, least)
     kind = np.full(found.shape, FREE, np.int8)
-    kind[dark | (options.noise_factor * noise > options.threshold_m)] = UNKNOWN
+    kind[~(valid & (noise <= options.threshold_m) & np.isfinite(residual))] = UNKNOWN
     kind[above > 0], kind[below > 0] = OBSTACLE, HOLE
     bright, count = regions(contrast > _ratio(options.amplitude_threshold_db), least)
     logger.info("%d obstacles, %d holes; %d alarms of the image alone", raised, sunk, count)
@@ -351,7 +301,6 @@ def detect(
         {
             "ground": surface,
             "height_above_ground": residual,
-            "height_noise": noise,
             "significant_height": significant,
             "map_class": kind,
             "contrast": contrast,
@@ -379,19 +328,9 @@ def _describe(area: Flags, residual: Floats, x: Floats, y: Floats) -> tuple[floa
 
 
 def _detections(products: Products, study: Study) -> xr.Dataset:
-    return detect(
-        products["dem"],
-        products["images"],
-        products["interferogram"],
-        options=study.detection,
-        looks=interferogram.looks(products["trajectory"], study),
-    )
+    return detect(products["dem"], products["images"], options=study.detection)
 
 
 STAGES = {
-    "detections": Stage(
-        _detections,
-        inputs=("dem", "images", "interferogram", "trajectory"),
-        sections=(*interferogram.LOOKS_KEYS, "detection"),
-    ),
+    "detections": Stage(_detections, inputs=("dem", "images"), sections=("detection",)),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -13,7 +14,8 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.radar import aperture, geometry, grid, trajectory
+from vinsar.processing import assessment, classification
+from vinsar.radar import aperture, geometry, grid, trajectory, waveform
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -38,7 +40,27 @@ _LEAST_RESIDUAL = 1e-3
 variables.declare(
     "dem",
     {
-        "height": Variable(GRID, "real", "m", "reconstructed height above the ground plane"),
+        "height": Variable(
+            GRID,
+            "real",
+            "m",
+            "reconstructed height above the ground plane",
+            "known where height_class is valid alone",
+        ),
+        "height_std": Variable(
+            GRID,
+            "real",
+            "m",
+            "standard deviation of the height",
+            "from the data: noise, smoothing by filter and resolution cell, height reference",
+        ),
+        "height_class": Variable(
+            GRID,
+            "integer",
+            "1",
+            "what kind of height it is, from the data alone",
+            flag_meanings=" ".join(classification.CLASSES),
+        ),
         "image_height": Variable(
             GRID, "real", "m", "height at the image's pixel, before DEM coding"
         ),
@@ -236,7 +258,7 @@ def code_dem(
     return np.ascontiguousarray(rows.T)
 
 
-def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Dataset:
+def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> Inverted:
     """Invert the unwrapped phase to heights and code the DEM.
 
     The flat-earth phase (Eq. 11), which focusing on the ground plane has removed, is added back;
@@ -252,8 +274,8 @@ def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Data
 
     Returns
     -------
-    xarray.Dataset
-        Product ``dem``.
+    Inverted
+        Phase, heights and places.
     """
     x, y = unwrapped["x"].values, unwrapped["y"].values
     lower, upper = trajectory.apertures(images)
@@ -267,32 +289,98 @@ def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> xr.Data
     unknown = int(np.isnan(height).sum())
     if unknown:
         logger.info("%d of %d cells of the DEM have no height", unknown, height.size)
-    return variables.dataset(
-        "dem",
-        {
-            "height": height,
-            "image_height": image_height,
-            "absolute_phase": absolute,
-            "phase_offset": offset,
-        },
-        {"x": x, "y": y},
-    )
+    return Inverted(absolute, image_height, true_x, true_y, height)
+
+
+@dataclass(frozen=True)
+class Inverted:
+    """Heights that are not assessed yet.
+
+    Attributes
+    ----------
+    phase
+        Absolute phase of the image's pixels (y, x), rad.
+    image_height
+        Their heights (y, x), m.
+    true_x, true_y
+        Where they belong (y, x), m.
+    height
+        Heights on the grid (y, x), m.
+    """
+
+    phase: Floats
+    image_height: Floats
+    true_x: Floats
+    true_y: Floats
+    height: Floats
 
 
 def _dem(products: Products, study: Study) -> xr.Dataset:
-    options = study.height
+    options, unwrapped, images = study.height, products["unwrapped"], products["images"]
+    x, y = unwrapped["x"].values, unwrapped["y"].values
     if options.reference == "level_ground":
         points = level_ground(
-            products["unwrapped"]["x"].values,
-            products["unwrapped"]["y"].values,
+            x,
+            y,
             [(r.x_min_m, r.x_max_m, r.y_min_m, r.y_max_m) for r in options.level_ground],
             options.level_ground_height_m,
         )
     else:
         rows = np.array([(p.x_m, p.y_m, p.height_m) for p in options.control_points])
         points = rows[:, 0], rows[:, 1], rows[:, 2]
-    offset = phase_offset(products["unwrapped"], products["images"], points, trend=options.trend)
-    return invert(products["unwrapped"], products["images"], offset)
+    offset = phase_offset(unwrapped, images, points, trend=options.trend)
+    found = invert(unwrapped, images, offset)
+    std, kind = assessment.assess(
+        images,
+        products["interferogram"],
+        products["filtered"],
+        phase=found.phase,
+        height=found.height,
+        true_y=found.true_y,
+        code=lambda values: code_dem(values, x, y, true_x=found.true_x, true_y=found.true_y),
+        reference=_reference(options, x, y),
+        filtering=study.filtering.model_dump(),
+        frequency=waveform.sampled(study.radar),
+        windows=(study.imaging.range_window, study.imaging.aperture_window),
+    )
+    return variables.dataset(
+        "dem",
+        {
+            "height": found.height,
+            "height_std": std,
+            "height_class": kind,
+            "image_height": found.image_height,
+            "absolute_phase": found.phase,
+            "phase_offset": offset,
+        },
+        {"x": x, "y": y},
+    )
+
+
+def _reference(options: Height, x: Floats, y: Floats) -> assessment.Reference:
+    """Return the pixels of the height reference."""
+    level = options.reference == "level_ground"
+    if level:
+        extents = [(r.y_min_m, r.y_max_m, r.x_min_m, r.x_max_m) for r in options.level_ground]
+    else:
+        extents = [(p.y_m, p.y_m, p.x_m, p.x_m) for p in options.control_points]
+    rectangles = []
+    for near, far, left, right in extents:
+        rows, columns = (
+            _indices(axis, *ends) for axis, ends in ((y, (near, far)), (x, (left, right)))
+        )
+        if rows is not None and columns is not None:
+            rectangles.append((rows, columns))
+    return assessment.Reference(tuple(rectangles), plane=options.trend == "plane", level=level)
+
+
+def _indices(axis: Floats, first: float, last: float) -> slice | None:
+    """Return the indices of an axis from one value to another; the nearest if there is none."""
+    if first == last:
+        nearest = int(np.abs(axis - first).argmin())
+        return slice(nearest, nearest + 1)
+    inside = np.nonzero((axis >= first) & (axis <= last))[0]
+    return slice(int(inside[0]), int(inside[-1]) + 1) if inside.size else None
 
 
 def _reference_exists(height: Height) -> Iterator[Fault]:
@@ -311,7 +399,17 @@ def _reference_exists(height: Height) -> Iterator[Fault]:
 
 
 STAGES = {
-    "dem": Stage(_dem, inputs=("unwrapped", "images"), sections=("height",)),
+    "dem": Stage(
+        _dem,
+        inputs=("unwrapped", "images", "interferogram", "filtered"),
+        sections=(
+            *waveform.KEYS,
+            "imaging.range_window",
+            "imaging.aperture_window",
+            "filtering",
+            "height",
+        ),
+    ),
 }
 
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from vinsar.radar.decorrelation import Decorrelation
@@ -39,7 +41,9 @@ class Response(Protocol):
         """Return values (y, x) filtered with these weights."""
         ...
 
-    def gain(self, noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> Floats:
+    def gain(
+        self, noise: Decorrelation, shape: tuple[int, int], spacing: tuple[float, float]
+    ) -> Floats:
         """Return the noise that is left over the noise that went in.
 
         Parameters
@@ -48,14 +52,18 @@ class Response(Protocol):
             What decorrelates each pixel (y, x).
         shape
             Shape of the image.
-        spacing_m
-            Spacing of its pixels, m.
+        spacing
+            Spacing of its pixels in x and y, m.
 
         Returns
         -------
         ndarray, shape (y, x)
             Variance across the mean phase, 1 for no filter; one over the effective looks.
         """
+        ...
+
+    def neighbours(self, noise: Decorrelation, spacing: tuple[float, float]) -> Floats:
+        """Return the correlation of a pixel's noise with that of the next one along y (y, x)."""
         ...
 
 
@@ -80,7 +88,9 @@ class Average:
         covered = _separable(np.ones(values.shape), self.weights)
         return np.asarray(total / covered)
 
-    def gain(self, noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> Floats:
+    def gain(
+        self, noise: Decorrelation, shape: tuple[int, int], spacing: tuple[float, float]
+    ) -> Floats:
         """Return the noise that is left over the noise that went in, as in `Response`.
 
         Across the fringes the average sees ``w(d) exp(-2 pi i f d)``: with X the filtered noise,
@@ -91,9 +101,9 @@ class Average:
         rows, columns = (_nodes(size) for size in shape)
         part = noise.at(np.ix_(rows, columns))
         count = self.weights.size
-        place = (np.arange(count) - (count - 1) / 2) * spacing_m
         own, cross = np.ones(part.coherence.size), np.ones(part.coherence.size)
         for axis in (0, 1):
+            place = (np.arange(count) - (count - 1) / 2) * spacing[axis]
             fringes = 2 * np.pi * part.fringes[axis][:, None]
             alike, crossed = np.zeros(own.size), np.zeros(own.size)
             for weight, here in zip(self.weights, place, strict=True):
@@ -102,7 +112,19 @@ class Average:
                 crossed += weight * (second * np.cos(fringes * (here + place))) @ self.weights
             own, cross = own * alike, cross * crossed
         found = part.combine(own, cross).reshape(rows.size, columns.size)
-        return _interpolate(found, rows, columns, shape)
+        covered = _separable(np.ones(shape), self.weights)
+        return np.asarray(_interpolate(found, rows, columns, shape) / covered)
+
+    def neighbours(self, noise: Decorrelation, spacing: tuple[float, float]) -> Floats:
+        """Return the correlation of a pixel's noise with its neighbour's, as in `Response`."""
+        if self.weights.size > 1:
+            return np.ones(noise.coherence.shape)
+        whole = noise.at(tuple(np.indices(noise.coherence.shape)))
+        lag = np.array([0.0, spacing[1]])
+        own, cross = whole.correlations(1, lag)
+        left = own - (whole.thermal**2)[:, None] * cross
+        ratio = left[:, 1] / np.maximum(left[:, 0], np.finfo(float).tiny)
+        return np.clip(ratio, 0, 1).reshape(noise.coherence.shape)
 
 
 class Goldstein:
@@ -166,7 +188,9 @@ class Goldstein:
 
         return self._add_up(fft.ifft2(fft.fft2(self._patches(values)) * self.weights))
 
-    def gain(self, noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> Floats:
+    def gain(
+        self, noise: Decorrelation, shape: tuple[int, int], spacing: tuple[float, float]
+    ) -> Floats:
         """Return the noise that is left over the noise that went in, as in `Response`.
 
         The sum over the patch's frequencies of its squared weights times the noise's spectrum.
@@ -181,47 +205,23 @@ class Goldstein:
         own, cross = (
             [np.fft.fft(values * overlap, axis=1).real / self.side for values in pair]
             for pair in zip(
-                *(part.correlations(axis, lag * spacing_m) for axis in (1, 0)), strict=True
+                *(part.correlations(axis, lag * spacing[axis]) for axis in (1, 0)), strict=True
             )
         )
         power = self.weights.reshape(-1, self.side, self.side) ** 2
         sums = [np.einsum("pij,pi,pj->p", power, *pair, optimize=True) for pair in (own, cross)]
         found = part.combine(*sums).reshape(self.down, self.across, 1, 1)
         spread = np.broadcast_to(found, (self.down, self.across, self.side, self.side))
-        return np.asarray(self._add_up(spread.astype(np.complex64)).real.astype(float))
+        left = self._add_up(spread.astype(np.complex64)).real.astype(float)
+        # At the edges there is less to average: of as many pixels as it averages inside.
+        cell = np.median(noise.resolution[0] * noise.resolution[1]) / (spacing[0] * spacing[1])
+        reach = max(1, round(float(np.sqrt(cell / np.median(left)))))
+        return np.asarray(left / _separable(np.ones(shape), np.full(reach, 1 / reach)))
 
-
-def of(
-    interferogram: Complexes,
-    *,
-    method: str,
-    goldstein_alpha: float,
-    goldstein_patch_px: int,
-    boxcar_window_px: int,
-) -> Response:
-    """Return the response of a filter that was applied to an interferogram.
-
-    Parameters
-    ----------
-    interferogram
-        What was filtered (y, x).
-    method
-        The filter, as in `filtering.apply`.
-    goldstein_alpha, goldstein_patch_px, boxcar_window_px
-        Its options, as there.
-
-    Raises
-    ------
-    ValueError
-        If there is no such filter.
-    """
-    if method == "goldstein":
-        return Goldstein(interferogram, alpha=goldstein_alpha, patch_px=goldstein_patch_px)
-    if method == "boxcar":
-        return Average(np.full(boxcar_window_px, 1 / boxcar_window_px))
-    if method == "none":
-        return Average(np.ones(1))
-    raise ValueError(f"the response of a filter '{method}' is not known")
+    def neighbours(self, noise: Decorrelation, spacing: tuple[float, float]) -> Floats:
+        """Return the correlation of a pixel's noise with its neighbour's, as in `Response`."""
+        del spacing
+        return np.ones(noise.coherence.shape)
 
 
 def gaussian_weights(std_px: float) -> Floats:
@@ -257,7 +257,9 @@ def _interpolate(
     return np.array([np.interp(np.arange(shape[0]), rows, line) for line in across.T]).T
 
 
-def rectangle_gain(noise: Decorrelation, shape: tuple[int, int], spacing_m: float) -> float:
+def rectangle_gain(
+    noise: Decorrelation, shape: tuple[int, int], spacing: tuple[float, float]
+) -> float:
     """Return the noise that the mean over a rectangle leaves over that of a pixel.
 
     Parameters
@@ -266,13 +268,59 @@ def rectangle_gain(noise: Decorrelation, shape: tuple[int, int], spacing_m: floa
         What decorrelates the pixel in its middle; its fringes do not count.
     shape
         Rows and columns.
-    spacing_m
-        Spacing of the pixels, m.
+    spacing
+        Spacing of the pixels in x and y, m.
     """
     own, cross = 1.0, 1.0
     for axis, count in ((1, shape[0]), (0, shape[1])):
         lag = np.arange(1 - count, count)
         weight = (count - np.abs(lag)) / count**2
-        first, second = noise.correlations(axis, lag * spacing_m)
+        first, second = noise.correlations(axis, lag * spacing[axis])
         own, cross = own * float((first @ weight)[0]), cross * float((second @ weight)[0])
     return float(noise.combine(np.array([own]), np.array([cross]))[0])
+
+
+def _goldstein(
+    values: Complexes, *, goldstein_alpha: float, goldstein_patch_px: int, **_: Any
+) -> Response:
+    return Goldstein(values, alpha=goldstein_alpha, patch_px=goldstein_patch_px)
+
+
+def _boxcar(values: Complexes, *, boxcar_window_px: int, **_: Any) -> Response:
+    del values
+    return Average(np.full(boxcar_window_px, 1 / boxcar_window_px))
+
+
+def _none(values: Complexes, **_: Any) -> Response:
+    del values
+    return Average(np.ones(1))
+
+
+RESPONSES: dict[str, Callable[..., Response]] = {
+    "goldstein": _goldstein,
+    "boxcar": _boxcar,
+    "none": _none,
+}
+"""The filters' responses by their names in `filtering.FILTERS`, with the same arguments."""
+
+
+def of(interferogram: Complexes, *, method: str, **options: Any) -> Response:
+    """Return the response of the filter that was applied to an interferogram.
+
+    Parameters
+    ----------
+    interferogram
+        What was filtered (y, x).
+    method
+        A key of `RESPONSES`.
+    options
+        The keys of the section ``filtering``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such filter.
+    """
+    if method not in RESPONSES:
+        raise ValueError(f"no response of a filter '{method}'; there are {', '.join(RESPONSES)}")
+    return RESPONSES[method](interferogram, **options)

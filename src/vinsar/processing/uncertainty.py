@@ -9,8 +9,7 @@ Three things err in a filtered phase.
   removed, which does not depend on the speckle's own brightness, as a sample coherence does. A
   filter leaves a part of it (`vinsar.processing.response`).
 * **Smoothing.** Resolution cell and filter average over terrain. What they take away from the
-  phase that is left tells what they have taken away from the true one: ``(1 - F) phi`` from
-  ``(1 - F) F phi``, to second order ``2 (1 - F) F phi - (1 - F) F^2 phi``. It is an error of fixed
+  phase of a few looks tells what they have taken away from the true one. It is an error of fixed
   sign in each place; over the surroundings its mean square counts as variance.
 * **The height reference**, whose error all heights share.
 """
@@ -22,17 +21,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vinsar.processing import response
 from vinsar.radar.decorrelation import Decorrelation
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
-
-    from vinsar.processing.response import Response
 
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
+    Spacing = tuple[float, float]
 
 PHASE_LOOKS = 9.0
 """Looks of the window whose mean phase is the surroundings'."""
@@ -49,8 +46,10 @@ _REACH_CELLS = 3
 _TINY = float(np.finfo(float).tiny)
 
 
-def window(looks: float, resolution: Floats, spacing_m: float) -> int:
-    """Return the side of a square window of about so many looks, an odd number of pixels.
+def window(
+    looks: float, resolution: Floats, spacing: Spacing, *, elongation: float = 1
+) -> tuple[int, int]:
+    """Return the sides of a square window of about so many looks, odd numbers of pixels.
 
     Parameters
     ----------
@@ -58,15 +57,31 @@ def window(looks: float, resolution: Floats, spacing_m: float) -> int:
         Independent looks: resolution cells in the window.
     resolution
         Resolution in x and y (2, y, x), m.
-    spacing_m
-        Spacing of the pixels, m.
+    spacing
+        Spacing of the pixels in x and y, m.
+    elongation
+        How many times longer in y than in x, for a window that is no square.
+
+    Returns
+    -------
+    tuple of int
+        Rows and columns.
     """
-    side = np.sqrt(looks * np.median(resolution[0] * resolution[1])) / spacing_m
-    return 2 * max(0, round(float(side - 1) / 2)) + 1
+    side = float(np.sqrt(looks * np.median(resolution[0] * resolution[1])))
+    stretch = np.sqrt(elongation)
+    return _odd(side * stretch / spacing[1]), _odd(side / stretch / spacing[0])
 
 
-def mean(values: NDArray[Any], window_px: int | tuple[int, int]) -> NDArray[Any]:
-    """Return the mean over a window around each pixel, real or complex (y, x)."""
+def _odd(count: float) -> int:
+    return 2 * max(0, round((count - 1) / 2)) + 1
+
+
+def _area(window_px: tuple[int, int], spacing: Spacing) -> float:
+    return window_px[0] * spacing[1] * window_px[1] * spacing[0]
+
+
+def mean(values: NDArray[Any], window_px: tuple[int, int]) -> NDArray[Any]:
+    """Return the mean over a window (rows, columns) around each pixel, real or complex (y, x)."""
     from scipy.ndimage import uniform_filter
 
     if np.iscomplexobj(values):
@@ -76,6 +91,18 @@ def mean(values: NDArray[Any], window_px: int | tuple[int, int]) -> NDArray[Any]
         real, imag = parts
         return np.asarray(real + 1j * imag)
     return np.asarray(uniform_filter(np.asarray(values, float), window_px))
+
+
+def slopes(values: Floats, spacing: Spacing) -> Floats:
+    """Return the derivatives of values (y, x) by x and by y (2, y, x); 0 along a single pixel."""
+    return np.stack(
+        [
+            np.gradient(values, step, axis=axis)
+            if values.shape[axis] > 1
+            else np.zeros(values.shape)
+            for axis, step in zip((1, 0), spacing, strict=True)
+        ]
+    )
 
 
 def unit(values: Complexes) -> Complexes:
@@ -105,7 +132,7 @@ def estimate(
     flat: Floats,
     *,
     resolution: Floats,
-    spacing_m: float,
+    spacing: Spacing,
     relative_bandwidth: float,
 ) -> Noise:
     """Return the noise of two images' interferogram.
@@ -121,8 +148,8 @@ def estimate(
         Phase of the ground plane (y, x), rad.
     resolution
         Resolution in x and y (2, y, x), m.
-    spacing_m
-        Spacing of the pixels, m.
+    spacing
+        Spacing of the pixels in x and y, m.
     relative_bandwidth
         Bandwidth over the carrier.
 
@@ -131,8 +158,8 @@ def estimate(
     Noise
         Power and origin.
     """
-    wide = window(NOISE_LOOKS, resolution, spacing_m)
-    narrow = window(PHASE_LOOKS, resolution, spacing_m)
+    wide = window(NOISE_LOOKS, resolution, spacing)
+    narrow = window(PHASE_LOOKS, resolution, spacing)
     powers = [mean(np.abs(image) ** 2, wide) for image in images]
     # The channels may differ in gain: both are scaled to their common power.
     ratio = np.sqrt(np.maximum(powers[0], _TINY) / np.maximum(powers[1], _TINY))
@@ -141,12 +168,12 @@ def estimate(
     along = (product * np.conj(unit(mean(product, narrow)))).real
     both = (np.abs(images[0]) ** 2 / ratio + np.abs(images[1]) ** 2 * ratio) / 2
     difference = np.maximum(mean(both - along, wide), 0) / power
-    looks = np.maximum(1.0, (narrow * spacing_m) ** 2 / (resolution[0] * resolution[1]))
+    looks = np.maximum(1.0, _area(narrow, spacing) / (resolution[0] * resolution[1]))
     coherence = unbiased(1 - difference, looks)
     absolute = mean(phase, narrow)
-    shift = np.stack(np.gradient(absolute, spacing_m)[::-1]) * resolution / (2 * np.pi)
+    shift = slopes(absolute, spacing) * resolution / (2 * np.pi)
     above = mean(phase - flat, narrow)
-    fringes = np.stack(np.gradient(above, spacing_m)[::-1]) / (2 * np.pi)
+    fringes = slopes(above, spacing) / (2 * np.pi)
     return Noise(
         power=np.asarray(power * (1 - coherence**2) / (2 * coherence)),
         decorrelation=Decorrelation(
@@ -185,7 +212,12 @@ def unbiased(coherence: Floats, looks: Floats) -> Floats:
 
 
 def noise_variance(
-    noise: Noise, response: Response, product: Complexes, filtered: Complexes, *, spacing_m: float
+    noise: Noise,
+    filter_: response.Response,
+    product: Complexes,
+    filtered: Complexes,
+    *,
+    spacing: Spacing,
 ) -> Floats:
     """Return the variance that noise leaves in the filtered phase.
 
@@ -193,12 +225,12 @@ def noise_variance(
     ----------
     noise
         The noise before the filter.
-    response
+    filter_
         The filter.
     product, filtered
         Interferogram before and after the filter (y, x).
-    spacing_m
-        Spacing of the pixels, m.
+    spacing
+        Spacing of the pixels in x and y, m.
 
     Returns
     -------
@@ -206,51 +238,48 @@ def noise_variance(
         Variance, rad^2; that of a uniform phase where there is no signal.
     """
     resolution = noise.decorrelation.resolution
-    if response.follows_amplitude:
+    if filter_.follows_amplitude:
         amplitude = np.abs(filtered)
     else:
-        amplitude = np.abs(mean(product, window(PHASE_LOOKS, resolution, spacing_m)))
-    gain = response.gain(noise.decorrelation, product.shape, spacing_m)
+        amplitude = np.abs(mean(product, window(PHASE_LOOKS, resolution, spacing)))
+    gain = filter_.gain(noise.decorrelation, product.shape, spacing)
     inverse = gain * noise.power / np.maximum(amplitude, _TINY)
     # The interval of a von Mises distribution that holds 68.3 %, to 5 % from |Z| = nu up.
     return np.minimum(inverse * (1 + np.minimum(inverse, 10) / 2), UNIFORM)
 
 
 def smoothing(
-    response: Response, product: Complexes, *, resolution: Floats, spacing_m: float
+    filter_: response.Response, product: Complexes, *, resolution: Floats, spacing: Spacing
 ) -> Floats:
     """Return what resolution cell and filter have taken away from the phase.
 
     Parameters
     ----------
-    response
+    filter_
         The filter.
     product
         Interferogram before the filter (y, x). Its mean over a few looks stands for the terrain.
     resolution
         Resolution in x and y (2, y, x), m.
-    spacing_m
-        Spacing of the pixels, m.
+    spacing
+        Spacing of the pixels in x and y, m.
 
     Returns
     -------
     ndarray, shape (y, x)
         Filtered less true phase, rad.
     """
-    side = window(PHASE_LOOKS, resolution, spacing_m)
+    side = window(PHASE_LOOKS, resolution, spacing)
     signal = mean(product, side)
     amplitude = np.abs(signal)
-    spread = [_point_power(float(np.median(part)), spacing_m) for part in resolution]
-
-    def again(phase: Complexes) -> Complexes:
-        return response.apply(_blur(amplitude * phase, *spread).astype(np.complex64))
+    spread = [
+        _point_power(float(np.median(part)), step)
+        for part, step in zip(resolution, spacing, strict=True)
+    ]
 
     start = unit(signal)
-    first = again(start)
-    second = again(unit(first))
-    once = np.angle(first * np.conj(start))
-    twice = np.angle(second * np.conj(unit(first)))
-    return np.asarray(mean(2 * once - twice, side), float)
+    again = filter_.apply(_blur(amplitude * start, *spread).astype(np.complex64))
+    return np.asarray(mean(np.angle(again * np.conj(start)), side), float)
 
 
 def _point_power(resolution_m: float, spacing_m: float) -> Floats:
@@ -271,17 +300,12 @@ def _blur(values: Complexes, along_x: Floats, along_y: Floats) -> Complexes:
 
 
 def reference_variance(
-    noise: Noise,
-    product: Complexes,
-    rectangles: Sequence[tuple[slice, slice]],
-    level: Floats,
-    *,
-    spacing_m: float,
+    noise: Noise, product: Complexes, level: Floats, where: tuple[slice, slice], *, spacing: Spacing
 ) -> float:
-    """Return the variance of a constant phase that rectangles of level ground tell.
+    """Return the variance of the phase that a rectangle of level ground tells.
 
-    Noise is averaged over each rectangle. What departs from level within one by more than its
-    noise may be common to all of it: ground is rough, and not level.
+    Noise is averaged over the rectangle. What departs from level within it by more than its noise
+    may be common to all of it: ground is rough, and not level.
 
     Parameters
     ----------
@@ -289,30 +313,24 @@ def reference_variance(
         The noise before any filter.
     product
         Interferogram (y, x).
-    rectangles
-        Rows and columns of each.
     level
-        Phase that the interferogram would have there if the ground were level (y, x), rad.
-    spacing_m
-        Spacing of the pixels, m.
+        Phase that the interferogram has there if the ground is level (y, x), rad.
+    where
+        Rows and columns of the rectangle.
+    spacing
+        Spacing of the pixels in x and y, m.
 
     Returns
     -------
     float
-        Variance, rad^2.
+        Variance, rad^2; at most that of a uniform phase.
     """
-    from vinsar.processing.response import rectangle_gain
-
-    side = window(PHASE_LOOKS, noise.decorrelation.resolution, spacing_m)
-    smooth = mean(product * np.exp(-1j * level), side)
-    total = 0.0
-    for rows, columns in rectangles:
-        part = smooth[rows, columns]
-        middle = (rows.start + rows.stop) // 2, (columns.start + columns.stop) // 2
-        here = noise.decorrelation.at(tuple(np.array([place]) for place in middle))
-        ratio = float(noise.power[rows, columns].mean() / max(np.abs(part.mean()), _TINY))
-        left = ratio * rectangle_gain(here, part.shape, spacing_m)
-        seen = ratio * rectangle_gain(here, (side, side), spacing_m)
-        residual = np.angle(part * np.conj(unit(part.mean())))
-        total += left + max(0.0, float(residual.var()) - seen)
-    return total / len(rectangles) ** 2
+    side = window(PHASE_LOOKS, noise.decorrelation.resolution, spacing)
+    part = mean(product * np.exp(-1j * level), side)[where]
+    middle = tuple(np.array([(axis.start + axis.stop) // 2]) for axis in where)
+    here = noise.decorrelation.at(middle)
+    ratio = float(noise.power[where].mean() / max(np.abs(part.mean()), _TINY))
+    left = ratio * response.rectangle_gain(here, part.shape, spacing)
+    seen = ratio * response.rectangle_gain(here, side, spacing)
+    residual = np.angle(part * np.conj(unit(part.mean())))
+    return float(min(left + max(0.0, float(residual.var()) - seen), UNIFORM))

@@ -105,6 +105,11 @@ def write(
             stored[name].attrs["flag_values"] = np.array([0, 1], np.int8)
             # Flags are long runs of one value: they shrink a hundredfold for little time.
             encoding[name] = {"zlib": True, "complevel": 1, "shuffle": False, "_FillValue": None}
+        elif values.dtype.kind == "i" and "flag_meanings" in values.attrs:
+            stored[name] = (values.dims, values.values, values.attrs)
+            count = len(values.attrs["flag_meanings"].split())
+            stored[name].attrs["flag_values"] = np.arange(count, dtype=values.dtype)
+            encoding[name] = {"zlib": True, "complevel": 1, "shuffle": False, "_FillValue": None}
         else:
             missing = name not in data.coords and bool(
                 values.dtype.kind == "f" and np.isnan(values.values).any()
@@ -186,6 +191,8 @@ def _restore(stored: xr.Dataset, product: str) -> xr.Dataset:
             data[name] = (real.dims, values, real.attrs | {"long_name": variable.long_name})
         elif variable.kind == "flag":
             data[name] = (stored[name].dims, stored[name].values.astype(bool), variable.attrs)
+        elif variable.flag_meanings:
+            data[name] = (stored[name].dims, stored[name].values, variable.attrs)
     for key in data.variables:
         data[key].attrs.pop("_FillValue", None)
         data[key].encoding = {}

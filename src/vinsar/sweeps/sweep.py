@@ -52,11 +52,14 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+_JUDGED = ("hidden_delivered", "visible_withheld")
+
 SWEEP: dict[str, Variable] = {
     name: variable
     for name, variable in accuracy.VARIABLES.items()
     if variable.dims == ("region",) and name != "cell_count"
 } | {
+    **{name: accuracy.VARIABLES[name] for name in _JUDGED},
     "coherence": Variable((), "real", "1", "median coherence on visible ground"),
     "residues": Variable((), "integer", "1", "residues of the filtered phase"),
     **point_response.VARIABLES,
@@ -459,7 +462,7 @@ def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -
     with blocks.serially():
         products = memo.products(_judged_by(case.study.scene), case.study, given)
     accuracy, interferogram, unwrapped, focus, truth = (products[name] for name in _RESULTS)
-    row: Row = {name: accuracy[name].values.tolist() for name in _STATISTICS}
+    row: Row = {name: accuracy[name].values.tolist() for name in (*_STATISTICS, *_JUDGED)}
     visible = ~truth["shadow"].values
     row["coherence"] = float(np.median(interferogram["coherence"].values[visible]))
     row["residues"] = int(np.abs(unwrapped["residue"].values).sum())

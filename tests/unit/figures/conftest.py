@@ -94,7 +94,11 @@ def make_sweep():
         std = np.broadcast_to(np.asarray(std_m, float)[..., None], shape)
         std = std * rng.uniform(0.9, 1.1, shape)
         shares = {"coherence", "point_gain", "peak_gain"}
-        trailing = {"region": (1.0, 0.4, 2.0), "channel": (1.0, 0.9), "ground_axis": (1.0, 0.1)}
+        trailing = {
+            "region": (1.0, 0.4, 2.0, 0.3),
+            "channel": (1.0, 0.9),
+            "ground_axis": (1.0, 0.1),
+        }
         data = {}
         for name, variable in SWEEP.items():
             one = 1 / (1 + 20 * std) if name in shares else std

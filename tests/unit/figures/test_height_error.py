@@ -12,13 +12,14 @@ def test_statistics_are_the_product_s(draw, written, products, study):
     figure = draw("fig4", products, study)
     texts = written(figure)
     rows = height_error.table_rows(products["accuracy"])
-    assert [row[0] for row in rows[2:]] == ["whole scene", "visible ground", "shadow"]
+    regions = ["delivered", "whole_scene", "visible_ground", "shadow"]
+    assert [row[0] for row in rows[2:]] == [region.replace("_", " ") for region in regions]
     for row in rows:
         for cell in row:
             assert cell == "" or cell in texts
     keys = ["median", "std", "percentile_95_absolute", "maximum_absolute"]
     shares = ["fraction_within_tolerance", "fraction_reconstructed"]
-    for row, region in zip(rows[2:], products["accuracy"]["region"].values, strict=True):
+    for row, region in zip(rows[2:], regions, strict=True):
         part = products["accuracy"].sel(region=region)
         assert int(row[1]) == int(part["cell_count"])
         numbers = [float(cell.replace("−", "-")) for cell in row[2:]]
@@ -39,7 +40,7 @@ def test_histogram_counts_every_cell_once(draw, products, study):
     }
     cells = dict(
         zip(
-            ("whole scene", "visible ground", "shadow"),
+            ("whole scene", "visible ground", "shadow", "delivered"),
             products["accuracy"]["cell_count"].values,
             strict=True,
         )

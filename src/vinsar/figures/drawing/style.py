@@ -32,7 +32,7 @@ FONT_SIZE_PT = 7.5
 MM_PER_INCH = 25.4
 TITLE_GAP_MM = 1.5
 
-BLUE, ORANGE, GREY, INK = "#0067a5", "#d95f02", "#8a8f94", "#1a1a1a"
+BLUE, ORANGE, GREEN, GREY, INK = "#0067a5", "#d95f02", "#1b7837", "#8a8f94", "#1a1a1a"
 NO_DATA = "#c9c9c9"
 
 DASHED, DOTTED, DASH_DOTTED = (0, (4, 1.5)), (0, (1, 1.2)), (0, (4, 1.2, 1, 1.2))

@@ -1,0 +1,245 @@
+"""What each height of a DEM is worth: its standard deviation and its class, from the data alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vinsar.processing import classification, response, uncertainty
+from vinsar.radar import aperture, waveform
+from vinsar.radar.instrument import Instrument
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    Flags = NDArray[np.bool_]
+    Floats = NDArray[np.floating]
+
+# Samples of a weighting, enough for its noise bandwidth.
+_WEIGHTS = 401
+
+# Antennas closer than this stand in one place.
+_SAME_M = 1e-6
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the unknown phase constant was taken from.
+
+    Attributes
+    ----------
+    rectangles
+        Rows and columns of the pixels of each piece of it: of level ground, or of single points.
+    plane
+        Whether a plane was fitted, not a constant.
+    level
+        Whether it is level ground, over which the phase was averaged before any filter would
+        matter; single points have the noise of the filtered phase.
+    """
+
+    rectangles: tuple[tuple[slice, slice], ...]
+    plane: bool
+    level: bool
+
+
+def assess(
+    images: xr.Dataset,
+    interferogram: xr.Dataset,
+    filtered: xr.Dataset,
+    *,
+    phase: Floats,
+    height: Floats,
+    true_y: Floats,
+    code: Callable[[Floats], Floats],
+    reference: Reference,
+    filtering: Mapping[str, Any],
+    frequency: Floats,
+    windows: tuple[waveform.WindowName, waveform.WindowName],
+) -> tuple[Floats, NDArray[np.int8]]:
+    """Return the standard deviation and the class of the heights of a DEM.
+
+    Parameters
+    ----------
+    images, interferogram, filtered
+        Products of these names.
+    phase
+        Absolute phase at the image's pixels (y, x), rad.
+    height
+        Heights on the grid (y, x), m; NaN where there is none.
+    true_y
+        Where the pixels belong along y (y, x), m.
+    code
+        From values at the image's pixels to values on the grid (DEM coding).
+    reference
+        What the phase's constant was taken from.
+    filtering
+        Section ``filtering``: the filter and its options.
+    frequency
+        Frequencies, Hz.
+    windows
+        Weightings of the frequencies and of the aperture.
+
+    Returns
+    -------
+    std
+        Standard deviation of each height (y, x), m; NaN where there is no height.
+    kind
+        Class of each height (y, x), an index into `classification.CLASSES`.
+    """
+    x, y = images["x"].values, images["y"].values
+    spacing = _spacing(x, y)
+    instrument = Instrument.of(images, frequency)
+    across, ahead = x[None, :], y[:, None]
+    antennas = instrument.lower, instrument.upper
+    flat = aperture.flat_earth_phase(*antennas, across, ahead, instrument.wavelength)
+    widening = np.array([_noise_width(name) for name in windows[::-1]])
+    resolution = instrument.resolution(across, ahead) * widening[:, None, None]
+    pictures = np.nan_to_num(images["image"].values)
+    product, smooth = (
+        np.nan_to_num(part["interferogram"].values) for part in (interferogram, filtered)
+    )
+    absolute = np.where(np.isfinite(phase), phase, flat)
+    bandwidth = float(frequency[-1] - frequency[0]) / waveform.carrier(frequency)
+    filter_ = response.of(product, **filtering)
+    noise = uncertainty.estimate(
+        pictures, absolute, flat,
+        resolution=resolution, spacing=spacing, relative_bandwidth=bandwidth,
+    )  # fmt: skip
+    by_noise = uncertainty.noise_variance(noise, filter_, product, smooth, spacing=spacing)
+    taken = uncertainty.smoothing(filter_, product, resolution=resolution, spacing=spacing)
+    wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
+    own = np.minimum(by_noise + uncertainty.mean(taken**2, wide), uncertainty.UNIFORM)
+    shared = _reference_variance(reference, noise, product, own, x, y)
+    per_difference = instrument.height_per_difference(across, ahead)
+    per_phase = np.abs(per_difference) * instrument.wavelength / (2 * np.pi)
+    # Interpolation between two pixels along y averages their noise.
+    share = np.where(np.isfinite(true_y), (true_y - ahead) / spacing[1], 0.0) % 1
+    alike = filter_.neighbours(noise.decorrelation, spacing)
+    kept = 1 - 2 * share * (1 - share) * (1 - alike)
+    std = np.sqrt(code((kept * own + shared) * per_phase**2)) * _at_one_place(
+        instrument, height, resolution, x, y
+    )
+    cycles = classification.split_band(
+        pictures, absolute - flat, antennas,
+        x=x, y=y, wavelength_m=instrument.wavelength, resolution=resolution,
+        # The phase is -2 pi / lambda times the difference.
+        relative_bandwidth=bandwidth, rising=bool(np.median(per_difference) < 0),
+    )  # fmt: skip
+    slack = 2 * np.sqrt(own) * per_phase * np.abs(_drift(instrument, x, y)[1])
+    held = np.zeros(product.shape, bool)
+    for where in reference.rectangles:
+        held[where] = True
+    kind = classification.classify(
+        height,
+        std,
+        dark=classification.coded(
+            code, classification.shadow(product, resolution=resolution, spacing=spacing)
+        ),
+        folded=classification.coded(code, classification.layover(true_y, slack)),
+        variance=code(by_noise),
+        cycles=[classification.Cycles(code(part.missing), code(part.std)) for part in cycles],
+        ambiguity=instrument.height_of_ambiguity(across, ahead),
+        reference=held,
+        antennas=_before(instrument, float(y[0])),
+        x=x,
+        y=y,
+        window_px=uncertainty.window(classification.SPLIT_LOOKS[0], resolution, spacing),
+    )
+    return std, kind
+
+
+def _spacing(x: Floats, y: Floats) -> tuple[float, float]:
+    """Return the spacing of the pixels in x and y, m; of a single one as if it were a metre."""
+    across, ahead = (float(axis[1] - axis[0]) if axis.size > 1 else 1.0 for axis in (x, y))
+    return across, ahead
+
+
+def _noise_width(name: waveform.WindowName) -> float:
+    """Return by how much a weighting widens the correlation of noise, in resolution cells."""
+    power = waveform.window(name, _WEIGHTS) ** 2
+    return float(_WEIGHTS * (power**2).sum() / power.sum() ** 2)
+
+
+def _drift(instrument: Instrument, x: Floats, y: Floats) -> Floats:
+    """Return how a pixel's target moves in x and in y as its height rises (2, y, x), m/m."""
+    length, slope = aperture.gradients(instrument.lower, x[None, :], y[:, None])
+    along = np.cross(length, slope, axis=0)
+    return np.asarray(along[:2] / along[2])
+
+
+def _at_one_place(
+    instrument: Instrument, height: Floats, resolution: Floats, x: Floats, y: Floats
+) -> Floats:
+    """Return the error at a place over that of a pixel, which moves with its height (y, x)."""
+    spacing = _spacing(x, y)
+    known = np.isfinite(height)
+    level = float(np.median(height[known])) if known.any() else 0.0
+    smooth = uncertainty.mean(
+        np.where(known, height, level),
+        uncertainty.window(uncertainty.PHASE_LOOKS, resolution, spacing),
+    )
+    slope = uncertainty.slopes(smooth, spacing)
+    return np.abs(1 - (slope * _drift(instrument, x, y)).sum(axis=0))
+
+
+def _reference_variance(
+    reference: Reference,
+    noise: uncertainty.Noise,
+    product: NDArray[np.complexfloating],
+    own: Floats,
+    x: Floats,
+    y: Floats,
+) -> Floats:
+    """Return the variance of the phase added to all pixels (y, x), rad^2."""
+    spacing = _spacing(x, y)
+    pieces = [part for where in reference.rectangles for part in _pieces(where, reference)]
+    # Level ground off the ground plane has a slow phase of its own, which a rectangle hardly sees.
+    level = np.zeros(product.shape)
+    found = np.array(
+        [
+            uncertainty.reference_variance(noise, product, level, part, spacing=spacing)
+            if reference.level
+            else own[part].mean()
+            for part in pieces
+        ]
+    )
+    if not reference.plane:
+        return np.full(product.shape, found.sum() / len(found) ** 2)
+    centers = np.array(
+        [[1.0, x[columns].mean() - x[0], y[rows].mean() - y[0]] for rows, columns in pieces]
+    )
+    inverse = np.linalg.pinv(centers)
+    covariance = (inverse * found) @ inverse.T
+    places = np.stack(np.broadcast_arrays(1.0, x[None, :] - x[0], y[:, None] - y[0]), axis=-1)
+    return np.asarray(np.einsum("yxi,ij,yxj->yx", places, covariance, places))
+
+
+def _pieces(where: tuple[slice, slice], reference: Reference) -> list[tuple[slice, slice]]:
+    """Return a rectangle, in quarters where a plane is fitted: it has an inclination of its own."""
+    if not (reference.plane and reference.level):
+        return [where]
+    halves = []
+    for axis in where:
+        middle = max(axis.start + 1, (axis.start + axis.stop) // 2)
+        halves.append([slice(axis.start, middle), slice(min(middle, axis.stop - 1), axis.stop)])
+    return [(rows, columns) for rows in halves[0] for columns in halves[1]]
+
+
+def _before(instrument: Instrument, near: float) -> list[Floats]:
+    """Return the places (3,) of the antennas that stand before the image, m."""
+    ends = [
+        end
+        for part in (instrument.lower, instrument.upper)
+        for end in (part.transmitter, part.receiver)
+        if end[1] < near
+    ]
+    places: list[Floats] = []
+    for end in ends:
+        if all(np.abs(end - place).max() > _SAME_M for place in places):
+            places.append(end)
+    return places
