@@ -12,12 +12,12 @@ configfile: "config/paper.yaml"
 container: "docker://python:3.11"
 
 
-include: "workflow/rules/lock.smk"
 include: "workflow/rules/common.smk"
+include: "workflow/rules/lock.smk"
 
 
 pathvars:
-    results=f"results/{STUDY.study}",
+    results=results.folder(STUDY.study).as_posix(),
     logs="<results>/logs",
     benchmarks="<results>/benchmarks",
 
@@ -32,7 +32,10 @@ include: "workflow/rules/report.smk"
 rule all:
     default_target: True
     input:
+        # Each that another was made from, too: it is missed if it is lost.
         expand("<results>/{product}.nc", product=wanted_products()),
+        expand("<results>/sweeps/{sweep}.nc", sweep=shown_sweeps()),
+        expand("<results>/{product}.nc", product=pipeline.from_files(STUDY)),
         expand(
             "<results>/figures/{figure}.{suffix}",
             figure=STUDY.outputs.figures,

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
 
-from vinsar import measure
+from vinsar import measure, results
+from vinsar.foundations import text
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
-from vinsar.results import export, lineage, reproduction
+from vinsar.results import export, lineage, reproduction, workflow
 from vinsar.study import ingest
+
+
+def _say(what: str) -> None:
+    """Write text, and nothing that a terminal obeys or cannot show."""
+    shown = text.printable(what, lines=True)
+    sys.stdout.write(text.fitting(shown, sys.stdout.encoding))
+    sys.stdout.flush()
 
 
 def _study(name: str, files: list[str]) -> Study | None:
@@ -28,9 +35,9 @@ def _study(name: str, files: list[str]) -> Study | None:
 def _trace(arguments: argparse.Namespace) -> int:
     name = lineage.trace(arguments.file).attributes.get("vinsar_study", "")
     study = _study(name, arguments.configfile)
-    sys.stdout.write(lineage.as_text(lineage.trace(arguments.file, study)))
+    _say(lineage.as_text(lineage.trace(arguments.file, study)))
     if study is None:
-        sys.stdout.write(_unknown(name))
+        _say(_unknown(name))
     return 0
 
 
@@ -40,11 +47,11 @@ def _verify(arguments: argparse.Namespace) -> int:
     found = lineage.verify(folder, study)
     for name, problems in sorted(found.items()):
         for problem in problems:
-            sys.stdout.write(f"{name}: {problem}\n")
+            _say(f"{name}: {problem}\n")
     sound = sum(not problems for problems in found.values())
-    sys.stdout.write(f"{sound} of {len(found)} results unchanged\n")
+    _say(f"{sound} of {len(found)} results unchanged\n")
     if study is None:
-        sys.stdout.write(_unknown(folder.name))
+        _say(_unknown(folder.name))
     return int(lineage.troubled(found))
 
 
@@ -54,24 +61,17 @@ def _unknown(name: str) -> str:
 
 def _diff(arguments: argparse.Namespace) -> int:
     lines = lineage.compare(arguments.first, arguments.second)
-    sys.stdout.write("".join(f"{line}\n" for line in lines) or "no difference\n")
+    _say("".join(f"{line}\n" for line in lines) or "no difference\n")
     return int(bool(lines))
 
 
 def _design(arguments: argparse.Namespace) -> int:
     study = ingest.load("config/paper.yaml", *arguments.configfile)
-    sys.stdout.write(design.as_markdown(design.Sheet(study)))
-    sys.stdout.flush()
-    # The workflow keeps the sheet and draws it; --nolock, because a study may be running.
-    files = ["--configfile", *arguments.configfile] if arguments.configfile else []
-    targets = ["design", "figure_design", "--nolock", "--quiet", "all"]
-    command = [sys.executable, "-m", "snakemake", *targets, *files]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)  # noqa: S603
-    if done.returncode:
-        sys.stderr.write(done.stdout + done.stderr)
-        return done.returncode
-    folder, ends = f"results/{study.study}", ", ".join(study.figures.formats)
-    sys.stdout.write(f"\nKept as {folder}/design.md, drawn as {folder}/figures/design ({ends}).\n")
+    _say(design.as_markdown(design.Sheet(study)))
+    # The workflow keeps the sheet and draws it.
+    workflow.make(["design", "figure_design"], arguments.configfile)
+    folder, ends = results.folder(study.study).as_posix(), ", ".join(study.figures.formats)
+    _say(f"\nKept as {folder}/design.md, drawn as {folder}/figures/design ({ends}).\n")
     return 0
 
 
@@ -83,16 +83,16 @@ def _reproduce(arguments: argparse.Namespace) -> int:
         arguments.folder, configuration=arguments.configfile or own, cores=arguments.cores
     )
     for different in verdict.differing:
-        sys.stdout.write(f"{different}: not the same bytes\n")
-    sys.stdout.write("".join(f"{reason}\n" for reason in verdict.reasons))
+        _say(f"{different}: not the same bytes\n")
+    _say("".join(f"{reason}\n" for reason in verdict.reasons))
     total, same = len(verdict.compared), len(verdict.compared) - len(verdict.differing)
     before, now = verdict.cores
-    sys.stdout.write(
+    _say(
         f"{same} of {total} results are the same bytes (cores: {before}, then {now}): "
         f"{'reproduced' if same == total else 'NOT reproduced'}\n"
     )
     if verdict.kept is not None:
-        sys.stdout.write(f"The fresh run is in {verdict.kept}\n")
+        _say(f"The fresh run is in {verdict.kept}\n")
     return int(same != total)
 
 
@@ -101,7 +101,7 @@ def _crate(arguments: argparse.Namespace) -> int:
 
     study = _known_study(Path(arguments.folder).name, arguments.configfile)
     archive = crate.write(arguments.folder, study, agent=arguments.agent)
-    sys.stdout.write(f"{arguments.folder} is an RO-Crate now; packed: {archive}\n")
+    _say(f"{arguments.folder} is an RO-Crate now; packed: {archive}\n")
     return 0
 
 
@@ -167,7 +167,8 @@ def main() -> int:
     try:
         return int(arguments.answer(arguments))
     except (ValueError, OSError) as error:
-        sys.stderr.write(f"vinsar: {error}\n")
+        shown = text.printable(f"vinsar: {error}\n", lines=True)
+        sys.stderr.write(text.fitting(shown, sys.stderr.encoding))
         return 2
 
 

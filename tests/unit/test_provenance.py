@@ -1,5 +1,6 @@
 import hashlib
 import json
+import subprocess
 
 import pytest
 
@@ -61,3 +62,60 @@ def test_a_description_tells_inputs_configuration_and_versions(tmp_path):
     assert found["vinsar_configuration"] == '{"a": 2, "b": 1}'
     assert set(json.loads(found["vinsar_libraries"])) >= {"numpy", "scipy", "numba", "xarray"}
     assert str(tmp_path) not in json.dumps(found)
+
+
+@pytest.fixture
+def commit(tmp_path, monkeypatch):
+    """Return a function that tells the commit of a package, and the package's repository."""
+    for who in ("AUTHOR", "COMMITTER"):
+        monkeypatch.setenv(f"GIT_{who}_NAME", "test")
+        monkeypatch.setenv(f"GIT_{who}_EMAIL", "test@localhost")
+
+    def repository(folder):
+        package = folder / "src" / "vinsar"
+        package.mkdir(parents=True)
+        (package / "__init__.py").touch()
+        for arguments in (("init", "--quiet"), ("add", "--all"), ("commit", "--quiet", "-m", "x")):
+            subprocess.run(["git", *arguments], cwd=folder, check=True)
+        return package
+
+    def tell(package):
+        monkeypatch.setattr(provenance, "_PACKAGE", package)
+        monkeypatch.setattr(provenance.git, "__kwdefaults__", {"cwd": package})
+        return provenance.commit.__wrapped__()
+
+    return tell, repository(tmp_path / "ours")
+
+
+def head(package):
+    command = ["git", "rev-parse", "--short=12", "HEAD"]
+    return subprocess.run(command, cwd=package, check=True, capture_output=True, text=True).stdout[
+        :-1
+    ]
+
+
+def test_the_commit_is_that_of_the_source(commit):
+    tell, package = commit
+    assert tell(package) == head(package)
+    (package / "__init__.py").write_text("changed = 1")
+    assert tell(package) == f"{head(package)}-dirty"
+
+
+@pytest.mark.parametrize("place", ["inside", ".", "src"])
+def test_an_archive_inside_another_repository_has_no_commit(commit, tmp_path, place):
+    tell, other = commit
+    package = other.parents[1] / place / "src" / "vinsar2"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    assert tell(package) == "unknown"
+    assert tell(tmp_path) == "unknown"
+
+
+@pytest.mark.parametrize(
+    "name", ["GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_CEILING_DIRECTORIES"]
+)
+def test_a_repository_that_the_environment_names_is_not_ours(commit, tmp_path, monkeypatch, name):
+    tell, package = commit
+    expected = head(package)
+    monkeypatch.setenv(name, str(tmp_path / "elsewhere"))
+    assert tell(package) == expected

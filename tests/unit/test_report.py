@@ -261,11 +261,13 @@ def test_both_renderings_escape_hold_their_provenance_and_are_the_same_twice(
             records={"dem.nc": RECORD},
         )
     )
-    origin = {"vinsar_stage": "report", "x": 'a (b) "</script>" \\ ü'}
+    origin = {"vinsar_stage": "report", "x": 'a (b) "</script>" \\ ü <!--<script '}
     page, pdf = report.as_html(found, origin), report.as_pdf(found, origin)
     assert page == report.as_html(found, origin)
     assert pdf == report.as_pdf(found, origin)
     assert "<script>alert" not in page
+    assert page.count("<script") == page.count("</script") == 1
+    assert "<!--" not in page
     assert html.escape(CLAIM["ours"], quote=False) in page
     assert "<code>a_long.name</code>, #hash $x$ *star* _under_ &lt;b&gt;" in page
     assert not re.search(r"""(src|href)=["'](?!data:image/png;base64,|#)""", page)

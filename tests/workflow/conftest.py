@@ -40,13 +40,14 @@ class Checkout:
             (self.folder / "extra.yaml").write_text(extra)
             files.append("extra.yaml")
         return subprocess.run(
-            [sys.executable, "-m", "snakemake", "--configfile", *files, "--nocolor", *arguments],
+            [sys.executable, "-P", "workflow/start.py", "--configfile", *files, "--nocolor",
+             *arguments],
             cwd=self.folder,
             env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
             capture_output=True,
             text=True,
             check=False,
-        )
+        )  # fmt: skip
 
     def ask(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run a command of ours on results, such as ``verify``."""

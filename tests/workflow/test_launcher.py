@@ -25,17 +25,19 @@ REAL_PYTHON = Path(sys._base_executable)
 WHOLE_SET_UP = ["venv", "ensurepip", "pip"]
 OLD = {"PRETENDED_VERSION": "3.9.18"}
 PATIENCE = 60.0
+ABOUT_A_STEP = ("installed", "settings")
 
 PROGRAM = """\
 import json, os, sys
-told = {"program": __spec__.name, "arguments": sys.argv[1:], "directory": os.getcwd(),
-        "process": os.getpid(), "path": sys.path, "python": sys.prefix}
+name = __spec__.name if __spec__ else os.path.basename(__file__)
+told = {"program": name, "environment": dict(os.environ), "arguments": sys.argv[1:],
+        "directory": os.getcwd(), "process": os.getpid(), "path": sys.path, "python": sys.prefix}
 print(json.dumps(told))
 sys.exit(int(os.environ.get("EXIT_CODE", "0")))
 """
 
 NOTE = """\
-import os, pathlib, sys, sysconfig, time
+import json, os, pathlib, sys, sysconfig, time
 def note(step):
     with open(os.environ["STEPS"], "a") as steps:
         steps.write(step + "\\n")
@@ -45,15 +47,21 @@ site_packages = pathlib.Path(sysconfig.get_paths()["purelib"])
 PIP = f"""\
 from stand_in import *
 if __name__ == "__main__":
+    if sys.argv[1] == "config":
+        print(os.environ.get("CONFIG_OF_PIP", ""))
+        sys.exit()
     note("pip " + " ".join(sys.argv[1:]))
-    mode = os.environ.get("PIP_MODE", "")
+    settings = dict(item for item in os.environ.items() if item[0].startswith("PIP_"))
+    note("settings " + json.dumps(settings))
+    mode = os.environ.get("MODE_OF_PIP", "")
     if mode == "fail":
         print("WARNING: the line is dead\\n", flush=True)
         raise ConnectionError("nobody answers")
-    while mode and not pathlib.Path(mode).exists():
+    while mode not in ("", "elsewhere") and not pathlib.Path(mode).exists():
         time.sleep(0.01)
-    for program in ("snakemake", "pytest"):
-        (site_packages / (program + ".py")).write_text({PROGRAM!r})
+    if mode != "elsewhere":
+        (site_packages / "pytest.py").write_text({PROGRAM!r})
+        (site_packages / "snakemake.py").touch()
     note("installed")
 """
 
@@ -113,7 +121,7 @@ class Checkout:
     @property
     def steps(self) -> list[str]:
         """The steps of the set-up that have run so far, by name."""
-        return [line.split()[0] for line in self.notes if line != "installed"]
+        return [line.split()[0] for line in self.notes if not line.startswith(ABOUT_A_STEP)]
 
     @property
     def notes(self) -> list[str]:
@@ -171,6 +179,8 @@ def told(done: subprocess.CompletedProcess[str]) -> dict:
 def new_checkout(root: Path, python: Path) -> Checkout:
     root.mkdir()
     shutil.copy(LAUNCHER, root)
+    (root / "workflow").mkdir()
+    (root / "workflow" / "start.py").write_text(PROGRAM)
     (root / "requirements.lock").write_text("# nothing\n")
     return Checkout(root, python)
 
@@ -201,7 +211,7 @@ def checkout(tmp_path, quick_python) -> Iterator[Checkout]:
 @pytest.fixture
 def ready(checkout) -> Checkout:
     """A checkout whose first start is over; its notes begin anew."""
-    assert told(checkout.run())["program"] == "snakemake"
+    assert told(checkout.run())["program"] == "start.py"
     (checkout.root / "steps.txt").unlink()
     return checkout
 
@@ -221,8 +231,7 @@ def real_start(tmp_path_factory) -> Iterator[tuple[Checkout, subprocess.Popen[st
     home = tmp_path_factory.mktemp("real")
     checkout = new_checkout(home / "checkout", REAL_PYTHON)
     (home / "users modules").mkdir()
-    (home / "users modules" / "snakemake.py").write_text(PROGRAM)
-    for module in ("venv", "pip", "ensurepip"):
+    for module in ("venv", "pip", "ensurepip", "json"):
         text = "raise SystemExit('the set-up met PYTHONPATH')"
         (home / "users modules" / f"{module}.py").write_text(text)
     with checkout.start("-n", PYTHONPATH=str(home / "users modules")) as process:
@@ -244,8 +253,8 @@ def test_pip_is_held_to_the_lock(lasting):
 
 def test_later_start_sets_nothing_up(lasting):
     before = lasting.stamp.stat()
-    done = lasting.run(PIP_MODE="fail")
-    assert told(done)["program"] == "snakemake"
+    done = lasting.run(MODE_OF_PIP="fail")
+    assert told(done)["program"] == "start.py"
     assert told(done)["arguments"] == []
     assert done.stderr == ""
     assert lasting.steps == WHOLE_SET_UP
@@ -255,7 +264,7 @@ def test_later_start_sets_nothing_up(lasting):
 def test_arguments_reach_snakemake_untouched(lasting, tmp_path):
     arguments = ["--cores", "1", "two words", "*", "", "test", "--", "-h"]
     tells = told(lasting.run(*arguments, cwd=tmp_path))
-    assert tells["program"] == "snakemake"
+    assert tells["program"] == "start.py"
     assert tells["arguments"] == arguments
     assert tells["directory"] == str(lasting.root)
 
@@ -265,6 +274,42 @@ def test_test_is_pytest(lasting):
     assert tells["program"] == "pytest"
     assert tells["arguments"] == ["-k", "two words", "test"]
     assert tells["directory"] == str(lasting.root)
+
+
+def test_what_others_set_for_other_programs_is_left_behind(lasting):
+    others = {"PYTHONPATH": "/mine", "PYTHONWARNINGS": "error", "MPLBACKEND": "module://mine"}
+    tells = told(lasting.run(**others))["environment"]
+    assert not set(others) & set(tells)
+    assert tells["PYTHONUTF8"] == "1"
+
+
+def test_of_pip_s_settings_only_those_of_where_packages_come_from_count(checkout):
+    settings = {
+        "global.target": "/elsewhere", "global.index-url": "file:///one", "global.prefix": "/p",
+        "install.index-url": "file:///two", "install.root": "/r", ":env:.dry-run": "1",
+        ":env:.proxy": "http://localhost:1", "install.find-links": "/a\n/b", "freeze.timeout": "3",
+    }  # fmt: skip
+    listed = "\n".join(f"{key}={value!r}" for key, value in sorted(settings.items()))
+    own = {"PIP_TARGET": "/x", "PIP_PREFIX": "/x", "PIP_DRY_RUN": "1", "PIP_USER": "1"}
+    assert told(checkout.run(CONFIG_OF_PIP=listed, **own))["program"] == "start.py"
+    (line,) = [line for line in checkout.notes if line.startswith("settings")]
+    assert json.loads(line.partition(" ")[2]) == {
+        "PIP_CONFIG_FILE": os.devnull,
+        "PIP_INDEX_URL": "file:///two",
+        "PIP_PROXY": "http://localhost:1",
+        "PIP_FIND_LINKS": "/a /b",
+    }
+
+
+def test_what_cannot_be_imported_is_not_said_to_be_ready(checkout):
+    checkout.lock.write_text("snakemake==9.27.1\n")
+    done = checkout.run(MODE_OF_PIP="elsewhere")
+    assert done.returncode == 1
+    _, sentence, *lines = done.stderr.splitlines()
+    assert "cannot be imported; see that no setting of pip's puts packages elsewhere" in sentence
+    assert lines[-1] == "  ModuleNotFoundError: No module named 'snakemake'"
+    assert not checkout.stamp.exists()
+    assert told(checkout.run())["program"] == "start.py"
 
 
 def test_exit_code_is_snakemakes(lasting):
@@ -285,7 +330,7 @@ def test_called_through_a_link(lasting, tmp_path):
 
 def test_old_python_needs_no_successor_once_set_up(lasting, tmp_path):
     done = lasting.run(command=(lasting.python, lasting.launcher), **OLD, PATH=str(tmp_path))
-    assert told(done)["program"] == "snakemake"
+    assert told(done)["program"] == "start.py"
     assert done.stderr == ""
 
 
@@ -293,10 +338,10 @@ def test_changed_lock_is_installed_into_the_same_environment(ready):
     kept = ready.venv / "kept"
     kept.touch()
     ready.lock.write_text("# something\n")
-    assert told(ready.run())["program"] == "snakemake"
+    assert told(ready.run())["program"] == "start.py"
     assert ready.steps == ["pip"]
     assert kept.exists()
-    assert told(ready.run())["program"] == "snakemake"
+    assert told(ready.run())["program"] == "start.py"
     assert ready.steps == ["pip"]
 
 
@@ -354,22 +399,22 @@ def test_moved_checkout_is_set_up_anew(ready, tmp_path):
 
 
 def test_failing_pip_is_one_sentence_and_its_last_lines(checkout):
-    done = checkout.run(PIP_MODE="fail")
+    done = checkout.run(MODE_OF_PIP="fail")
     assert done.returncode == 1
     assert done.stdout == ""
     _, sentence, *lines = done.stderr.splitlines()
     assert sentence.startswith("vinsar: pip could not install requirements.lock; see that the net")
     assert "start ./run again, which resumes" in sentence
     assert lines[-2:] == ["  WARNING: the line is dead", "  ConnectionError: nobody answers"]
-    assert told(checkout.run())["program"] == "snakemake"
+    assert told(checkout.run())["program"] == "start.py"
 
 
 def test_lock_taken_back_after_a_failed_change_is_installed_again(ready):
     before = ready.lock.read_text()
     ready.lock.write_text("# something\n")
-    assert ready.run(PIP_MODE="fail").returncode == 1
+    assert ready.run(MODE_OF_PIP="fail").returncode == 1
     ready.lock.write_text(before)
-    assert told(ready.run())["program"] == "snakemake"
+    assert told(ready.run())["program"] == "start.py"
     assert ready.steps == ["pip", *WHOLE_SET_UP]
 
 
@@ -437,20 +482,20 @@ def test_lock_that_is_not_there_is_one_sentence(checkout):
 
 
 def test_interrupted_set_up_is_taken_up_again(checkout, tmp_path):
-    process = checkout.start(PIP_MODE=str(tmp_path / "never"))
+    process = checkout.start(MODE_OF_PIP=str(tmp_path / "never"))
     wait_until(lambda: "pip" in checkout.steps)
     os.killpg(process.pid, signal.SIGINT)
     done = finish(process)
     assert done.returncode == 130
     assert done.stderr.splitlines()[1:] == ["vinsar: interrupted; the next ./run goes on"]
     assert "installed" not in checkout.notes
-    assert told(checkout.run())["program"] == "snakemake"
+    assert told(checkout.run())["program"] == "start.py"
     assert checkout.steps == WHOLE_SET_UP * 2
 
 
 def test_second_start_waits_for_what_a_killed_first_one_left_running(checkout, tmp_path):
     go_on = tmp_path / "go on"
-    first = checkout.start(PIP_MODE=str(go_on))
+    first = checkout.start(MODE_OF_PIP=str(go_on))
     wait_until(lambda: "pip" in checkout.steps)
     first.kill()
     assert finish_killed(first) == -signal.SIGKILL
@@ -459,8 +504,9 @@ def test_second_start_waits_for_what_a_killed_first_one_left_running(checkout, t
     time.sleep(0.1)
     assert checkout.steps == WHOLE_SET_UP
     go_on.touch()
-    assert told(finish(second))["program"] == "snakemake"
-    assert [line.split()[0] for line in checkout.notes] == [*WHOLE_SET_UP, "installed"] * 2
+    assert told(finish(second))["program"] == "start.py"
+    ends = [line.split()[0] for line in checkout.notes if not line.startswith("settings")]
+    assert ends == [*WHOLE_SET_UP, "installed"] * 2
 
 
 def finish_killed(process: subprocess.Popen) -> int:
@@ -471,13 +517,13 @@ def finish_killed(process: subprocess.Popen) -> int:
 
 def test_two_first_starts_set_up_once(checkout, tmp_path):
     go_on = tmp_path / "go on"
-    both = [checkout.start(PIP_MODE=str(go_on)) for _ in range(2)]
+    both = [checkout.start(MODE_OF_PIP=str(go_on)) for _ in range(2)]
     for process in both:
         assert "setting up" in process.stderr.readline()
     wait_until(lambda: "pip" in checkout.steps)
     go_on.touch()
     for process in both:
-        assert told(finish(process))["program"] == "snakemake"
+        assert told(finish(process))["program"] == "start.py"
     assert checkout.steps == WHOLE_SET_UP
 
 
@@ -487,7 +533,7 @@ def test_first_start_with_the_real_venv_and_pip(real_start):
     tells = told(done)
     assert tells["arguments"] == ["-n"]
     assert tells["python"] == str(checkout.venv)
-    assert str(checkout.root.parent / "users modules") in tells["path"]
+    assert str(checkout.root.parent / "users modules") not in tells["path"]
     (pth,) = checkout.venv.glob("lib/python*/site-packages/vinsar.pth")
     assert pth.read_text() == f"{checkout.root / 'src'}\n"
     assert done.stderr.splitlines() == ["vinsar: setting up .venv (about a minute, once) ..."]

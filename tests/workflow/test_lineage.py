@@ -6,6 +6,8 @@ import shutil
 import netCDF4
 import pytest
 
+from vinsar.results import lineage
+
 CONFIG = ("--configfile", "tiny.yaml")
 SPOILT = ("fig1.pdf", "fig2.png", "fig4.pdf")
 
@@ -39,6 +41,47 @@ def test_every_kind_of_damage_is_found_and_named(copy):
     assert "foreign.nc: there is no record of its making" in done.stdout
     assert "accuracy.nc: stale: made from another dem.nc" in done.stdout
     assert "figures/fig3.png: modified" not in done.stdout
+
+
+def edit(path, change):
+    record = json.loads(path.read_text())
+    change(record)
+    path.write_text(json.dumps(record, indent=2, sort_keys=True) + "\n")
+
+
+EDITS = {
+    "dem.nc": lambda record: record.update(rule="another"),
+    "truth.nc": lambda record: record.update(started="2014-01-01T00:00:00.000+00:00"),
+    "facets.nc": lambda record: record["provenance"].update(vinsar_commit="0123456789ab"),
+    "terrain.nc": lambda record: record["provenance"].update(vinsar_configuration="{}"),
+    "images.nc": lambda record: record.pop("provenance"),
+    "claims.md": lambda record: record.pop("digest"),
+    "figures/fig1.png": lambda record: record["inputs"].clear(),
+    "accuracy.json": lambda record: record.clear(),
+}
+
+
+def test_every_edit_of_a_record_is_found(copy):
+    for name, change in EDITS.items():
+        edit(copy.results / f"records/{name}.json", change)
+    # One that its editor has signed anew, against the provenance in the file itself.
+    signed = copy.results / "records/figures/fig2.pdf.json"
+    record = json.loads(signed.read_text())
+    record["provenance"]["vinsar_commit"] = "0123456789ab"
+    signed.write_text(json.dumps(lineage.signed(record)))
+    (copy.results / "records/focus.nc.json").write_bytes(b"\xff{")
+    done = copy.ask("verify", "results/tiny", *CONFIG)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    for name in EDITS:
+        assert f"{name}: its record " in done.stdout, name
+    assert "figures/fig2.pdf: its record tells another vinsar_commit than" in done.stdout
+    assert "focus.nc: its record cannot be read" in done.stdout
+    for command in (("diff", "results/tiny", "results/tiny"), ("crate", "results/tiny", *CONFIG)):
+        done = copy.ask(*command)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+        assert "record" in done.stderr
 
 
 def test_other_code_and_configuration_make_results_stale(copy):
@@ -89,7 +132,7 @@ def test_two_studies_are_told_apart(copy):
         if "filtering" in changed:
             changed["filtering"]["goldstein_alpha"] = 0.5
             content["provenance"]["vinsar_configuration"] = json.dumps(changed)
-            record.write_text(json.dumps(content))
+            record.write_text(json.dumps(lineage.signed(content)))
     summary = copy.folder / "results/other/accuracy.json"
     numbers = json.loads(summary.read_text())
     numbers["whole_scene"]["std_error_m"] += 0.01

@@ -78,7 +78,7 @@ class Study:
 
     def wait_for_blocks(self, process, count):
         until = time.monotonic() + 60
-        while not self.checkpoint.exists() or self.checkpoint.read_bytes().count(b"\n{") < count:
+        while not self.checkpoint.exists() or self.checkpoint.read_bytes().count(b'"code"') < count:
             assert process.poll() is None, self.said()
             assert time.monotonic() < until, self.said()
             time.sleep(0.02)

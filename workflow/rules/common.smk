@@ -5,7 +5,7 @@ from functools import cache, partial
 from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
-from vinsar import figures
+from vinsar import figures, results
 from vinsar import report as study_report
 from vinsar.evaluation import detection_accuracy
 from vinsar.foundations.errors import ConfigurationError

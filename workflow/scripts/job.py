@@ -1,5 +1,6 @@
 """What every script does around its one library call."""
 
+import hashlib
 import logging
 import os
 import signal
@@ -9,11 +10,23 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-import dask
-import psutil
 
-from vinsar.results import lineage, provenance, storage
-from vinsar.sweeps import sweep
+def digests(snakemake):
+    """Return the digests of the rule's code as it is now."""
+    return {path: hashlib.sha256(Path(path).read_bytes()).digest() for path in snakemake.input.code}
+
+
+# Before the library is imported: what runs is what was read here, or a digest differs afterwards.
+# Worker processes import this file, too, but make no results.
+_rule = getattr(sys.modules["__main__"], "snakemake", None)
+CODE = digests(_rule) if _rule else {}
+
+import dask  # noqa: E402
+import psutil  # noqa: E402
+
+from vinsar import results  # noqa: E402
+from vinsar.results import lineage, provenance, storage  # noqa: E402
+from vinsar.sweeps import sweep  # noqa: E402
 
 
 @contextmanager
@@ -24,7 +37,9 @@ def job(snakemake):
     end_with_snakemake()
     started, clock = time.time(), time.monotonic()
     try:
+        inputs = {name: provenance.sha256(path) for name, path in product_paths(snakemake).items()}
         yield
+        refuse_changes(snakemake, inputs)
         record(snakemake, started, time.monotonic() - clock)
     except (ValueError, OSError, sweep.SweepError) as error:
         logging.error("%s: %s", snakemake.rule, error)
@@ -39,12 +54,28 @@ def job(snakemake):
         os._exit(130)
 
 
+def refuse_other_code(snakemake):
+    """Fail if the code is no longer what runs: no result tells of code that did not make it."""
+    now = digests(snakemake)
+    changed = [path for path, digest in CODE.items() if now[path] != digest]
+    if changed:
+        raise ValueError(f"{', '.join(changed)} changed while this ran; start ./run again")
+
+
+def refuse_changes(snakemake, inputs):
+    """Fail if code or inputs changed meanwhile; Snakemake removes what a failed job has made."""
+    refuse_other_code(snakemake)
+    for name, path in product_paths(snakemake).items():
+        if provenance.sha256(path) != inputs[name]:
+            raise ValueError(f"{path} changed while this ran; start ./run again")
+
+
 def end_with_snakemake():
     """Interrupt this process when the Snakemake that wants it is gone, as after kill -9."""
     above = [
         process
         for process in psutil.Process().parents()
-        if any(Path(part).name == "snakemake" for part in process.cmdline())
+        if any(Path(part).name in ("snakemake", "start.py") for part in process.cmdline())
     ]
 
     def watch():
@@ -70,7 +101,7 @@ def record(snakemake, started, seconds):
     for path in snakemake.output:
         lineage.write_record(
             path,
-            folder=Path("results") / snakemake.params.configuration["study"],
+            folder=results.folder(snakemake.params.configuration["study"]),
             attributes=attributes(snakemake, stage_of(snakemake, path)),
             started=started,
             seconds=seconds,

@@ -4,7 +4,7 @@ import json
 import logging
 from pathlib import Path
 
-from job import attributes, job, read_products
+from job import attributes, job, read_products, refuse_other_code
 from progress import Progress
 
 from vinsar.results import provenance, storage
@@ -20,12 +20,17 @@ def main():
     code = f"{provenance.code_digest(snakemake.input.code)} {versions}"
     output = Path(snakemake.output[0])
     finished = checkpoint.Checkpoint(output.with_name(f".{output.stem}.jsonl"), code)
+
+    def keep(rows):
+        refuse_other_code(snakemake)
+        finished.keep(rows)
+
     with cluster.workers(study.dask, snakemake.threads) as compute, Progress(name) as progress:
         result = sweep.run(
             study,
             name,
             finished=finished.rows(),
-            keep=finished.keep,
+            keep=keep,
             progress=progress,
             compute=compute,
             given=read_products(snakemake),

@@ -48,8 +48,8 @@ def as_html(report: Report, provenance: Mapping[str, str]) -> str:
     )
     environment.filters |= {"inline": _inline, "data_uri": _data_uri, "size": _pixels}
     template = environment.from_string(_HTML.read_text(encoding="utf-8"))
-    # A script element ends at the first "</", whatever it holds.
-    packed = json.dumps(dict(provenance), sort_keys=True).replace("</", "<\\/")
+    # Within a script element, "</" and "<!--" mean something, whatever it holds.
+    packed = json.dumps(dict(provenance), sort_keys=True).replace("<", "\\u003c")
     return template.render(report=report, verdicts=VERDICTS, provenance=packed)
 
 

@@ -95,6 +95,9 @@ def write(folder: str | Path, study: Study, *, agent: str = "") -> Path:
         If the study has not run to its end, or a result is modified, missing or stale.
     """
     folder = Path(folder)
+    lineage.refuse_links(folder)
+    if (folder / SOURCE).is_symlink():
+        raise ValueError(f"{folder / SOURCE} is a link, where the sources are to be; remove it")
     _refuse_unsound(folder, study)
     records = lineage.read_records(folder)
     own = {name: _place(path) for name, path in lineage.own_files(folder, records).items()}

@@ -6,6 +6,7 @@ its digest, when it was made, where, and how long it took.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
@@ -15,6 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vinsar.foundations.text import printable
 from vinsar.results import provenance, storage
 
 if TYPE_CHECKING:
@@ -28,6 +30,9 @@ RECORDS = "records"
 SOURCE = "source"
 
 Records = dict[str, dict[str, Any]]
+
+NO_RECORD = "there is no record of its making"
+MODIFIED = "modified by hand: its bytes are not those that were written"
 
 
 def write_record(
@@ -85,9 +90,37 @@ def write_record(
         "python": platform.python_version(),
         "provenance": dict(attributes),
     }
-    target = folder / RECORDS / relative.with_name(relative.name + ".json")
-    with storage.atomic(target) as temporary:
-        temporary.write_text(json.dumps(record, indent=2, sort_keys=True) + "\n")
+    text = json.dumps(signed(record), indent=2, sort_keys=True) + "\n"
+    with storage.atomic(_record_of(folder, relative.as_posix())) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def signed(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a record with a digest of all that it says, by which an edit of it is known."""
+    content = {key: value for key, value in record.items() if key != "digest"}
+    text = json.dumps(content, sort_keys=True)
+    return content | {"digest": hashlib.sha256(text.encode()).hexdigest()}
+
+
+def _record_of(folder: Path, name: str) -> Path:
+    return folder / RECORDS / f"{name}.json"
+
+
+def _read_record(folder: Path, name: str) -> dict[str, Any]:
+    """Return the record of a result; `ValueError` says what is wrong with it."""
+    try:
+        record = json.loads(_record_of(folder, name).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ValueError(NO_RECORD) from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise ValueError(f"its record cannot be read ({error})") from error
+    if not isinstance(record, dict) or "digest" not in record:
+        raise ValueError("its record is not whole")
+    if record != signed(record):
+        raise ValueError("its record has been edited")
+    if record["file"] != name:
+        raise ValueError(f"its record is that of {record['file']}")
+    return record
 
 
 def _instant(seconds: float) -> str:
@@ -102,17 +135,24 @@ def read_records(folder: str | Path) -> Records:
     ValueError
         If there are none, or one cannot be read.
     """
-    folder = Path(folder)
+    found = {}
+    for name in _recorded(Path(folder)):
+        try:
+            found[name] = _read_record(Path(folder), name)
+        except ValueError as error:
+            path = _record_of(Path(folder), name)
+            raise ValueError(
+                f"{Path(folder) / name}: {error}; run the study again ({path})"
+            ) from error
+    return found
+
+
+def _recorded(folder: Path) -> list[str]:
+    """Return the results of which there are records."""
     if not (folder / RECORDS).is_dir():
         raise ValueError(f"{folder} holds no records of a study; run it first")
-    found = {}
-    for path in sorted((folder / RECORDS).rglob("*.json")):
-        try:
-            record = json.loads(path.read_text(encoding="utf-8"))
-            found[record["file"]] = record
-        except (ValueError, KeyError, TypeError) as error:
-            raise ValueError(f"{path} is no record of a result ({error}); delete it") from error
-    return found
+    paths = sorted((folder / RECORDS).rglob("*.json"))
+    return [path.relative_to(folder / RECORDS).as_posix().removesuffix(".json") for path in paths]
 
 
 def own_files(folder: str | Path, records: Records) -> dict[str, Path]:
@@ -130,15 +170,44 @@ def own_files(folder: str | Path, records: Records) -> dict[str, Path]:
     dict of Path
         By the names that they have in the records: paths from the working folder, or absolute ones
         if they lie outside of it.
+
+    Raises
+    ------
+    ValueError
+        If a record names a file that its result does not declare by its digest.
     """
     found = {}
-    for record in records.values():
-        for name in record["inputs"].values():
-            if name.startswith("../"):
-                path = (Path(folder) / name).resolve()
-                inside = path.is_relative_to(Path.cwd())
-                found[name] = path.relative_to(Path.cwd()) if inside else path
+    for result, record in records.items():
+        declared = json.loads(record["provenance"].get("vinsar_inputs", "{}"))
+        for key, name in record["inputs"].items():
+            if ".." not in Path(name).parts and not Path(name).is_absolute():
+                continue
+            path = (Path(folder) / name).resolve()
+            if not path.is_file() or declared.get(key) != provenance.sha256(path):
+                raise ValueError(
+                    f"{Path(folder) / result}: its record names {name}, which is not the file that "
+                    "the result declares"
+                )
+            inside = path.is_relative_to(Path.cwd())
+            found[name] = path.relative_to(Path.cwd()) if inside else path
     return found
+
+
+def refuse_links(folder: str | Path) -> None:
+    """Refuse symbolic links in a study's folder that lead out of it.
+
+    Raises
+    ------
+    ValueError
+        If there is one; the message names it.
+    """
+    home = Path(folder).resolve()
+    for place, folders, files in os.walk(home):
+        for name in (*folders, *files):
+            path = Path(place) / name
+            if path.is_symlink() and not path.resolve().is_relative_to(home):
+                shown = Path(folder) / path.relative_to(home)
+                raise ValueError(f"{shown} is a link that leads out of the study; remove it")
 
 
 def read_provenance(path: str | Path) -> dict[str, str]:
@@ -218,6 +287,10 @@ def _from_svg(path: Path) -> dict[str, str]:
     return dict(json.loads(node.text)) if node is not None and node.text else {}
 
 
+# Their provenance is in their records alone.
+_WITHOUT_PROVENANCE = {".json", ".md"}
+
+
 @dataclass
 class Origin:
     """A result with all that it comes from.
@@ -260,7 +333,7 @@ def trace(path: str | Path, study: Study | None = None) -> Origin:
     ValueError
         If the file is missing or carries no provenance.
     """
-    return _trace(Path(path), _study_folder(Path(path)), study, None, {})
+    return _trace(Path(path), _study_folder(Path(path)), _Now(study), None, {})
 
 
 def _study_folder(path: Path) -> Path:
@@ -273,51 +346,70 @@ def _study_folder(path: Path) -> Path:
 def _trace(
     path: Path,
     folder: Path,
-    study: Study | None,
+    now: _Now,
     expected: str | None,
     known: dict[tuple[Path, str | None], Origin],
 ) -> Origin:
     """Trace a result once, however many others were made from it."""
     if (path, expected) not in known:
-        known[path, expected] = _traced(path, folder, study, expected, known)
+        known[path, expected] = _traced(path, folder, now, expected, known)
     return known[path, expected]
 
 
 def _traced(
     path: Path,
     folder: Path,
-    study: Study | None,
+    now: _Now,
     expected: str | None,
     known: dict[tuple[Path, str | None], Origin],
 ) -> Origin:
     if not path.is_file():
         return Origin(path, {}, ["missing"])
-    record = _record(path, folder)
+    name = path.absolute().relative_to(folder).as_posix()
+    wrong, record = "", None
+    try:
+        record = _read_record(folder, name)
+    except ValueError as error:
+        wrong = str(error)
     try:
         attributes = read_provenance(path)
     except ValueError as error:
         if record is None:
             raise
         attributes = record["provenance"]
-        if path.suffix not in {".json", ".md"}:
+        if path.suffix not in _WITHOUT_PROVENANCE:
             return Origin(path, attributes, [str(error)])
-    origin = Origin(path, attributes)
+    origin = Origin(path, attributes, [wrong] if wrong else [])
     digest = provenance.sha256(path)
-    if record is None:
-        origin.changes.append("there is no record of its making")
-    elif record["sha256"] != digest:
-        origin.changes.append("modified by hand: its bytes are not those that were written")
+    if record is not None:
+        origin.changes += _own_changes(path, digest, record)
     if expected is not None and digest != expected:
         origin.changes.append("not the bytes that the result above was made from")
-    origin.changes += _differences(attributes, study)
+    origin.changes += now.differences(attributes)
     sources = json.loads(attributes.get("vinsar_inputs", "{}"))
-    for name, sha in sources.items():
-        source = (record or {}).get("inputs", {}).get(name, f"{name}.nc")
+    for source_name, sha in sources.items():
+        source = (record or {}).get("inputs", {}).get(source_name, f"{source_name}.nc")
         if source.startswith("../"):
             origin.inputs.append(_own_file(folder / source, sha))
         else:
-            origin.inputs.append(_trace(folder / source, folder, study, sha, known))
+            origin.inputs.append(_trace(folder / source, folder, now, sha, known))
     return origin
+
+
+def _own_changes(path: Path, digest: str, record: Mapping[str, Any]) -> Iterator[str]:
+    """Tell what does not hold of a result by itself, beside its record."""
+    if digest != record["sha256"]:
+        yield MODIFIED
+    elif path.suffix not in _WITHOUT_PROVENANCE:
+        try:
+            carried = read_provenance(path)
+        except ValueError as error:
+            yield str(error)
+            return
+        told = record["provenance"]
+        other = sorted(key for key in told if carried.get(key) != told[key])
+        if other:
+            yield f"its record tells another {other[0]} than the file itself"
 
 
 def _own_file(path: Path, expected: str) -> Origin:
@@ -329,33 +421,45 @@ def _own_file(path: Path, expected: str) -> Origin:
     return Origin(path.resolve(), {"vinsar_stage": "own file"}, changes)
 
 
-def _record(path: Path, folder: Path) -> dict[str, Any] | None:
-    relative = path.absolute().relative_to(folder)
-    record = folder / RECORDS / relative.with_name(relative.name + ".json")
-    if not record.is_file():
-        return None
-    try:
-        return dict(json.loads(record.read_text(encoding="utf-8")))
-    except ValueError:
-        return None
+class _Now:
+    """Code, libraries and configuration as they are now, each looked up once."""
 
+    def __init__(self, study: Study | None) -> None:
+        self.study = study.study if study else None
+        whole = study.model_dump(mode="json") if study else {}
+        self._sweeps = whole.get("sweeps", {})
+        self._values = dict(leaves(whole))
+        self._code: dict[str, str | None] = {}
+        self._versions = provenance.library_versions()
 
-def _differences(attributes: Mapping[str, str], study: Study | None) -> Iterator[str]:
-    for name, sha in json.loads(attributes["vinsar_code"]).items():
-        if not Path(name).is_file():
-            yield f"code {name} is gone"
-        elif provenance.sha256(name) != sha:
-            yield f"code {name} has changed"
-    now = provenance.library_versions()
-    for name, version in json.loads(attributes["vinsar_libraries"]).items():
-        if now.get(name) != version:
-            yield f"library {name} was {version}, is {now.get(name, 'not installed')}"
-    if study is None:
-        return
-    for key, value in leaves(json.loads(attributes["vinsar_configuration"])):
-        current = _current(study, attributes["vinsar_stage"], key)
-        if current != value:
-            yield f"configuration {key} was {value}, is {current}"
+    def differences(self, attributes: Mapping[str, str]) -> Iterator[str]:
+        """Tell what differs from when a result with these attributes was made."""
+        for name, sha in json.loads(attributes["vinsar_code"]).items():
+            if name not in self._code:
+                self._code[name] = provenance.sha256(name) if Path(name).is_file() else None
+            if self._code[name] is None:
+                yield f"code {name} is gone"
+            elif self._code[name] != sha:
+                yield f"code {name} has changed"
+        for name, version in json.loads(attributes["vinsar_libraries"]).items():
+            if self._versions.get(name) != version:
+                current = self._versions.get(name, "not installed")
+                yield f"library {name} was {version}, is {current}"
+        if self.study is None:
+            return
+        if attributes.get("vinsar_study", self.study) != self.study:
+            yield f"a result of the study '{attributes['vinsar_study']}'"
+        for key, value in leaves(json.loads(attributes["vinsar_configuration"])):
+            current = self._current(attributes["vinsar_stage"], key)
+            if current != value:
+                yield f"configuration {key} was {value}, is {current}"
+
+    def _current(self, stage: str, key: str) -> Any:
+        if key.startswith("sweep."):
+            # A sweep's own definition stands under its name.
+            own = self._sweeps.get(stage.removeprefix("sweep "), {})
+            return dict(leaves({"sweep": own})).get(key)
+        return self._values.get(key)
 
 
 def leaves(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -367,16 +471,9 @@ def leaves(value: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield prefix, value
 
 
-def _current(study: Study, stage: str, key: str) -> Any:
-    whole = study.model_dump(mode="json")
-    # A sweep's own definition stands under its name.
-    whole["sweep"] = whole["sweeps"].get(stage.removeprefix("sweep "), {})
-    return dict(leaves(whole)).get(key)
-
-
 def as_text(origin: Origin) -> str:
     """Return a tree: each result with configuration and seeds, marked where something changed."""
-    return "\n".join(_lines(origin, "", "", set())) + "\n"
+    return "\n".join(map(printable, _lines(origin, "", "", set()))) + "\n"
 
 
 def _lines(origin: Origin, first: str, rest: str, seen: set[Path]) -> Iterator[str]:
@@ -431,36 +528,89 @@ def verify(folder: str | Path, study: Study | None = None) -> dict[str, list[str
     ValueError
         If the folder holds no records.
     """
-    folder = Path(folder)
-    records = read_records(folder)
-    shas = {
-        name: provenance.sha256(folder / name) if (folder / name).is_file() else None
-        for name in records
+    return {
+        name: [printable(problem.text) for problem in problems]
+        for name, problems in _examine(Path(folder), study, ()).items()
     }
-    found: dict[str, list[str]] = {}
-    for name, record in records.items():
-        if shas[name] is None:
-            found[name] = ["missing"]
+
+
+def unsound(folder: str | Path, study: Study, names: Iterable[str]) -> dict[str, list[str]]:
+    """Tell which of some results have to be made again, and why.
+
+    Parameters
+    ----------
+    folder
+        The study's folder.
+    study
+        The configuration as it is now.
+    names
+        The results, by their paths within the folder.
+
+    Returns
+    -------
+    dict of list of str
+        For each result that does not hold what is wrong with it, a sentence each; those left out
+        whose only fault is that they were made from another of them.
+    """
+    folder, wanted = Path(folder), set(names)
+    found = _examine(folder, study, wanted) if folder.is_dir() else {}
+    wrong = {name for name in wanted if found.get(name)}
+    result = {}
+    for name in sorted(wrong):
+        own = [printable(problem.text) for problem in found[name] if problem.source not in wrong]
+        if own:
+            result[name] = own
+    return result
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What does not hold, and the result that it is due to if it is another's fault."""
+
+    text: str
+    source: str = ""
+
+
+def _examine(
+    folder: Path, study: Study | None, wanted: Iterable[str]
+) -> dict[str, list[_Problem]]:
+    """Return what is wrong with each result of which there is a record, or that is wanted."""
+    now = _Now(study)
+    shas: dict[str, str | None] = {}
+
+    def sha(name: str) -> str | None:
+        if name not in shas:
+            path = folder / name
+            shas[name] = provenance.sha256(path) if path.is_file() else None
+        return shas[name]
+
+    found: dict[str, list[_Problem]] = {}
+    recorded = _recorded(folder) if (folder / RECORDS).is_dir() or not wanted else []
+    for name in dict.fromkeys([*recorded, *wanted]):
+        digest = sha(name)
+        if digest is None:
+            found[name] = [_Problem("missing")]
             continue
-        problems = []
-        if shas[name] != record["sha256"]:
-            problems.append("modified by hand: its bytes are not those that were written")
-        made_from = json.loads(record["provenance"].get("vinsar_inputs", "{}"))
-        for key, sha in made_from.items():
+        try:
+            record = _read_record(folder, name)
+        except ValueError as error:
+            found[name] = [_Problem(str(error))]
+            continue
+        attributes = record["provenance"]
+        problems = [_Problem(text) for text in _own_changes(folder / name, digest, record)]
+        for key, made_from in json.loads(attributes.get("vinsar_inputs", "{}")).items():
             source = record["inputs"].get(key, f"{key}.nc")
-            if source not in shas and (folder / source).is_file():
-                shas[source] = provenance.sha256(folder / source)
-            if shas.get(source) != sha:
-                problems.append(f"stale: made from another {source}")
-        problems += [f"stale: {text}" for text in _differences(record["provenance"], study)]
+            if sha(source) != made_from:
+                problems.append(_Problem(f"stale: made from another {source}", source))
+        problems += [_Problem(f"stale: {text}") for text in now.differences(attributes)]
         found[name] = problems
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
         if name.startswith(f"{SOURCE}/"):
             continue
         ours = path.suffix in {".nc", ".png", ".pdf", ".svg"} and not path.name.startswith(".")
-        if ours and path.is_file() and name not in records:
-            found[name] = ["there is no record of its making"]
+        if ours and path.is_file() and name not in found:
+            found[name] = [_Problem(NO_RECORD)]
     return found
 
 
@@ -499,7 +649,7 @@ def compare(first: str | Path, second: str | Path) -> list[str]:
                     lines.append(f"{label}: {a:.6g} and {b:.6g}, {b - a:+.3g}")
                 else:
                     lines.append(f"{label}: {a} and {b}")
-    return lines
+    return [printable(line) for line in lines]
 
 
 def _pairs(one: Mapping[str, Any], two: Mapping[str, Any]) -> list[tuple[list[str], Any, Any]]:

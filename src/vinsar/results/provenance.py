@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import os
 import subprocess
 from functools import cache
 from importlib import metadata
@@ -112,17 +113,18 @@ def workflow_files() -> list[Path]:
     Raises
     ------
     ValueError
-        If the working folder is not the repository.
+        If the working folder is not the repository, or a link in it leads elsewhere.
     """
     found = [Path(name) for name in _RUN_BY if Path(name).is_file()]
     for name in _RUN_FROM:
         if not Path(name).is_dir():
             raise ValueError(f"{Path.cwd()} has no folder {name}; start in the repository")
-        found += [
-            path
-            for path in Path(name).rglob("*")
-            if path.is_file() and "__pycache__" not in path.parts and path.name[0] != "."
-        ]
+        home = Path(name).resolve()
+        for path in Path(name).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts and path.name[0] != ".":
+                if not path.resolve().is_relative_to(home):
+                    raise ValueError(f"{path} is a link that leads out of {name}; remove it")
+                found.append(path)
     return sorted(found)
 
 
@@ -190,12 +192,29 @@ def library_versions() -> dict[str, str]:
 
 @cache
 def commit() -> str:
-    """Return the commit of the source, with ``-dirty`` if files differ from it."""
-    command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    """Return the commit of the source, with ``-dirty`` if files differ from it.
+
+    ``unknown`` if the source is not a git repository's own: an archive of it may lie inside
+    another one.
+    """
     try:
-        done = subprocess.run(  # noqa: S603
-            command, cwd=_PACKAGE, capture_output=True, text=True, check=True
-        )
+        # Of an archive inside another repository, that one knows no file.
+        git("ls-files", "--error-unmatch", "--", "__init__.py")
+        return git("describe", "--always", "--dirty", "--abbrev=12", "--exclude=*")
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
+
+
+def git(*arguments: str, cwd: Path = _PACKAGE) -> str:
+    """Return what git says, of the repository that a folder lies in and of no other."""
+    # A hook or a shell may point it elsewhere (GIT_DIR, GIT_WORK_TREE, GIT_INDEX_FILE ...).
+    own = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    done = subprocess.run(  # noqa: S603
+        ["git", *arguments],  # noqa: S607
+        cwd=cwd,
+        env=own,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return done.stdout.strip()

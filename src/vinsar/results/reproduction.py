@@ -144,13 +144,14 @@ def _check_out(commit: str, place: Path) -> None:
             (place / path).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, place / path)
         return
-    for command in (
-        ["git", "clone", "--quiet", "--shared", "--no-checkout", ".", str(place)],
-        ["git", "-C", str(place), "checkout", "--quiet", "--detach", commit],
-    ):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
-        if done.returncode != 0:
-            raise ValueError(f"commit {commit} cannot be had from here: {done.stderr.strip()}")
+    try:
+        here = Path.cwd()
+        provenance.git("clone", "--quiet", "--shared", "--no-checkout", ".", str(place), cwd=here)
+        provenance.git("checkout", "--quiet", "--detach", commit, cwd=place)
+    except subprocess.CalledProcessError as error:
+        raise ValueError(
+            f"commit {commit} cannot be had from here: {error.stderr.strip()}"
+        ) from error
 
 
 def _run(place: Path, targets: list[str], configuration: Sequence[str | Path], cores: int) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import logging
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,9 +12,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+logger = logging.getLogger(__name__)
+
 
 class Checkpoint:
-    """Rows appended to a file, a line a block; a line that was cut short is not read.
+    """Rows appended to a file, a line a block, each with a digest of its own.
+
+    A line that was cut short, or whose bytes are not those that were written, is not read.
 
     Parameters
     ----------
@@ -31,13 +37,20 @@ class Checkpoint:
         if not self.path.exists():
             return found
         # A power cut may leave any bytes.
-        with self.path.open(encoding="utf-8", errors="replace") as file:
-            for line in file:
-                try:
-                    block = json.loads(line)
-                except json.JSONDecodeError:
+        with self.path.open("rb") as file:
+            for number, line in enumerate(file, 1):
+                if not line.strip():
                     continue
-                if isinstance(block, dict) and block.get("code") == self.code:
+                digest, _, text = line.rstrip(b"\n").partition(b" ")
+                if digest != _digest(text):
+                    logger.warning(
+                        "line %d of %s is not as it was written; its cases are computed again",
+                        number,
+                        self.path,
+                    )
+                    continue
+                block = json.loads(text)
+                if block["code"] == self.code:
                     found |= block["rows"]
         return found
 
@@ -57,12 +70,13 @@ class Checkpoint:
         if not rows:
             return
         # Begins a line of its own, whatever an interrupted write has left before.
-        text = "\n" + json.dumps({"code": self.code, "rows": rows}) + "\n"
+        text = json.dumps({"code": self.code, "rows": rows}).encode()
+        line = b"\n" + _digest(text) + b" " + text + b"\n"
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             # Unbuffered and at once: what others append comes before or after, not between.
             with self.path.open("ab", buffering=0) as file:
-                data = memoryview(text.encode())
+                data = memoryview(line)
                 while data:
                     data = data[file.write(data) :]
                 os.fsync(file.fileno())
@@ -72,3 +86,7 @@ class Checkpoint:
     def remove(self) -> None:
         """Forget the rows: the sweep is whole."""
         self.path.unlink(missing_ok=True)
+
+
+def _digest(text: bytes) -> bytes:
+    return hashlib.sha256(text).hexdigest().encode()

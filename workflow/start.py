@@ -1,0 +1,177 @@
+"""Start Snakemake for ./run: check what it is given before, and what it has left afterwards.
+
+Snakemake is started in this process, with three of its habits changed: it runs no code that stands
+in a YAML file, it quotes the path of Python, and it is told which results do not hold.
+"""
+
+import functools
+import os
+import sys
+from pathlib import Path
+
+import yte
+from snakemake import cli
+from snakemake.script import PythonScript
+from snakemake.workflow import Workflow
+
+from vinsar import results
+from vinsar.foundations import strict_yaml
+from vinsar.results import lineage
+
+ROUNDS = 3
+ROUND = "VINSAR_ROUND"
+ENDS_OF_FILES = (".yaml", ".yml", ".json")
+CONFIGFILE = ("--configfile", "--configfiles")
+CONFIG = ("--config", "-C")
+
+
+def main(arguments):
+    """Check, run, check again; return the exit code."""
+    arguments = targets_last(arguments)
+    yte.process_yaml = read_profile
+    parser, options = cli.parse_args(arguments)
+    check_configuration(options)
+    if options.executor not in (None, "local", "dryrun", "touch"):
+        refuse_unquotable()
+    quote_interpreter()
+    workflows = follow_workflows()
+    done = cli.args_to_api(options, parser)
+    for workflow in workflows:
+        unsound = find_unsound(workflow)
+        if unsound and done and not workflow.dryrun:
+            return make_again(arguments, unsound)
+        for name, problems in unsound.items():
+            # Of a run that failed, much is stale or missing.
+            if done or not problems[0].startswith(("stale", "missing")):
+                say(f"{name} does not hold: {problems[0]}; the next ./run makes it again")
+    return 0 if done else 1
+
+
+def targets_last(arguments):
+    """Move targets that stand behind a configuration behind ``--``, or it would swallow them."""
+    kept, targets, belongs, last = [], [], None, False
+    for argument in arguments:
+        if last:
+            targets.append(argument)
+        elif argument == "--":
+            last = True
+        elif argument.startswith("-"):
+            belongs = "file" if argument in CONFIGFILE else "value" if argument in CONFIG else None
+            kept.append(argument)
+        elif (belongs == "more files" and not is_configuration(argument)) or (
+            belongs == "value" and "=" not in argument
+        ):
+            targets.append(argument)
+        else:
+            kept.append(argument)
+            belongs = "more files" if belongs == "file" else belongs
+    return [*kept, "--", *targets] if targets else kept
+
+
+def is_configuration(argument):
+    """Tell a configuration file from a target."""
+    path = Path(argument)
+    result = path.parts[:1] == (results.FOLDER,) and path.suffix == ".json"
+    return path.suffix in ENDS_OF_FILES and not result
+
+
+def read_profile(stream, **_):
+    """Read what Snakemake reads as YAML, without running any of it."""
+    try:
+        return strict_yaml.load(stream.name)
+    except strict_yaml.FileError as error:
+        fail(error)
+
+
+def check_configuration(options):
+    """Refuse files that cannot be read whole, and a study that would take the paper's place."""
+    named = options.replace_workflow_config
+    given = [entry.partition("=")[0] for entry in options.config or ()]
+    for path in options.configfile:
+        try:
+            given += strict_yaml.load(path)
+        except strict_yaml.FileError as error:
+            fail(f"{error} (paths begin in {Path.cwd()})")
+    if strict_yaml.CODE in given:
+        fail(f"{strict_yaml.CODE} would run the configuration as a program")
+    if given and "study" not in given and not named:
+        where = " ".join(map(str, options.configfile)) or "--config"
+        fail(
+            f"{where} does not name its study (study: ...), so that its results would take the "
+            f"place of those in {results.FOLDER}/paper"
+        )
+
+
+def quote_interpreter():
+    """Let Snakemake quote the path of Python, which it starts by a shell."""
+    execute = PythonScript._execute_cmd
+
+    @functools.wraps(execute)
+    def quoting(self, command, **options):
+        return execute(self, command.replace("{py_exec}", "{py_exec:q}"), **options)
+
+    PythonScript._execute_cmd = quoting
+
+
+def refuse_unquotable():
+    """Refuse a folder in which the jobs of a cluster could not start Python."""
+    odd = sorted({c for c in sys.executable if not (c.isalnum() or c in "/._-+@%:,=")})
+    if odd:
+        shown = " ".join("space" if c == " " else c for c in odd)
+        fail(f"jobs of a cluster cannot start in a folder whose path has {shown}: {Path.cwd()}")
+
+
+def follow_workflows():
+    """Return a list that gets each workflow which Snakemake executes."""
+    followed = []
+    execute = Workflow.execute
+
+    @functools.wraps(execute)
+    def following(self, *arguments, **options):
+        followed.append(self)
+        return execute(self, *arguments, **options)
+
+    Workflow.execute = following
+    return followed
+
+
+def find_unsound(workflow):
+    """Return what is wrong with results that Snakemake left or takes to be up to date."""
+    study = workflow.globals.get("STUDY")
+    if study is None or workflow._dag is None:
+        return {}
+    jobs = set(workflow.dag.jobs)
+    if workflow.dryrun:
+        jobs -= set(workflow.dag.needrun_jobs())
+    folder = results.folder(study.study)
+    made = {Path(path) for job in jobs for path in job.output}
+    names = [path.relative_to(folder).as_posix() for path in made if path.is_relative_to(folder)]
+    return lineage.unsound(folder, study, names)
+
+
+def make_again(arguments, unsound):
+    """Run Snakemake again, for the results that do not hold."""
+    number = int(os.environ.get(ROUND, "1"))
+    for name, problems in sorted(unsound.items()):
+        say(f"{name} does not hold: {problems[0]}")
+    if number >= ROUNDS:
+        fail(f"these results do not hold though they were made {number} times")
+    say("they are made again")
+    os.environ[ROUND] = str(number + 1)
+    files = [str(path) for path in unsound]
+    command = [sys.executable, "-P", __file__, "--forcerun", *files, "--rerun-incomplete"]
+    os.execv(sys.executable, [*command, *arguments])  # noqa: S606
+
+
+def say(message):
+    """Print one line about the run."""
+    sys.stderr.write(f"vinsar: {message}\n")
+
+
+def fail(message):
+    """End with a sentence instead of a traceback."""
+    sys.exit(f"vinsar: {message}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
