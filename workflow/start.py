@@ -33,6 +33,8 @@ def main(arguments):
     check_configuration(options)
     if options.executor not in (None, "local", "dryrun", "touch"):
         refuse_unquotable()
+    if not options.dryrun:
+        refuse_read_only(".snakemake", results.FOLDER)
     quote_interpreter()
     workflows = follow_workflows()
     done = cli.args_to_api(options, parser)
@@ -119,6 +121,16 @@ def refuse_unquotable():
     if odd:
         shown = " ".join("space" if c == " " else c for c in odd)
         fail(f"jobs of a cluster cannot start in a folder whose path has {shown}: {Path.cwd()}")
+
+
+def refuse_read_only(*folders):
+    """Refuse folders in which nothing can be written."""
+    for folder in folders:
+        place = Path(folder).absolute()
+        while not place.exists():
+            place = place.parent
+        if not os.access(place, os.W_OK | os.X_OK):
+            fail(f"{place} cannot be written; results and what Snakemake knows of them go there")
 
 
 def follow_workflows():

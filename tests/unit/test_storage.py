@@ -1,3 +1,6 @@
+import resource
+import signal
+
 import netCDF4
 import numpy as np
 import pytest
@@ -160,3 +163,34 @@ def test_a_map_without_a_detection_comes_back(tmp_path):
     storage.write(found, tmp_path / "detections.nc", "detections")
     back = storage.read(tmp_path / "detections.nc", "detections")
     xr.testing.assert_identical(back.drop_attrs(deep=False), found)
+
+
+@pytest.fixture
+def _small_files():
+    """Let no file grow beyond some bytes, which fails in the middle of writing."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    signal.signal(signal.SIGXFSZ, handler)
+
+
+def as_text(path):
+    with storage.atomic(path) as temporary:
+        temporary.write_text("x" * 100_000)
+
+
+def as_netcdf(path):
+    storage.write(images(), path, "images")
+
+
+@pytest.mark.usefixtures("_small_files")
+@pytest.mark.parametrize("write", [as_text, as_netcdf])
+def test_what_cannot_be_written_whole_is_told_with_its_name(tmp_path, write):
+    path = tmp_path / "a.nc"
+    path.write_bytes(b"before")
+    with pytest.raises(OSError, match=r"^cannot write .*/a\.nc: "):
+        write(path)
+    assert path.read_bytes() == b"before"
+    assert [one.name for one in tmp_path.iterdir()] == ["a.nc"]

@@ -25,6 +25,7 @@ import dask  # noqa: E402
 import psutil  # noqa: E402
 
 from vinsar import results  # noqa: E402
+from vinsar.foundations.text import printable  # noqa: E402
 from vinsar.results import lineage, provenance, storage  # noqa: E402
 from vinsar.sweeps import sweep  # noqa: E402
 
@@ -33,6 +34,7 @@ from vinsar.sweeps import sweep  # noqa: E402
 def job(snakemake):
     """Log to the rule's file; say what went wrong in a sentence, not in a traceback."""
     logging.basicConfig(filename=snakemake.log[0], level=logging.INFO, format="%(message)s")
+    logging.raiseExceptions = False  # The disk may be full for the log as well.
     dask.config.set(num_workers=snakemake.threads)
     end_with_snakemake()
     started, clock = time.time(), time.monotonic()
@@ -42,7 +44,10 @@ def job(snakemake):
         refuse_changes(snakemake, inputs)
         record(snakemake, started, time.monotonic() - clock)
     except (ValueError, OSError, sweep.SweepError) as error:
-        logging.error("%s: %s", snakemake.rule, error)
+        logging.error("%s: %s", snakemake.rule, printable(str(error), lines=True))
+        sys.exit(1)
+    except MemoryError:
+        logging.error("%s: there is not enough memory for it", snakemake.rule)
         sys.exit(1)
     except Exception as error:
         logging.exception("%s: a fault of vinsar itself, %s", snakemake.rule, error)

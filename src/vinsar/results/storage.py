@@ -39,31 +39,39 @@ def atomic(path: str | Path) -> Iterator[Path]:
     ------
     Path
         The temporary name, with the same suffix.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written, as on a full disk; the message tells the final name.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    temporary = None
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(
+            prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent
+        )
+        temporary = Path(name)
+        os.close(handle)
         yield temporary
         # mkstemp makes files private; results are as readable as any other file.
         mask = os.umask(0)
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
-        _reach_disk(temporary, path)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _reach_disk(temporary: Path, path: Path) -> None:
-    # Else a power cut may leave the final name with nothing behind it.
-    with temporary.open("rb+") as file:
-        try:
+        # Else a power cut may leave the final name with nothing behind it.
+        with temporary.open("rb+") as file:
             os.fsync(file.fileno())
-        except OSError as error:
-            raise OSError(f"cannot write {path}: {error.strerror or error}") from error
+        temporary.replace(path)
+    except OSError as error:
+        # What went wrong with another file tells its name itself.
+        ours = error.filename is None or Path(error.filename).parent in (path.parent, Path())
+        if not ours or str(error).startswith("cannot write"):
+            raise
+        raise OSError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
 
 
 def write(
