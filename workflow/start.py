@@ -87,21 +87,19 @@ def read_profile(stream, **_):
 
 def check_configuration(options):
     """Refuse files that cannot be read whole, and a study that would take the paper's place."""
-    named = options.replace_workflow_config
-    given = [entry.partition("=")[0] for entry in options.config or ()]
-    for path in options.configfile:
-        try:
-            given += strict_yaml.load(path)
-        except strict_yaml.FileError as error:
-            fail(f"{error} (paths begin in {Path.cwd()})")
-    if strict_yaml.CODE in given:
+    values = [entry.partition("=")[0] for entry in options.config or ()]
+    if strict_yaml.CODE in values:
         fail(f"{strict_yaml.CODE} would run the configuration as a program")
-    if given and "study" not in given and not named:
-        where = " ".join(map(str, options.configfile)) or "--config"
-        fail(
-            f"{where} does not name its study (study: ...), so that its results would take the "
-            f"place of those in {results.FOLDER}/paper"
-        )
+    try:
+        if "study" in values or options.replace_workflow_config:
+            for path in options.configfile:
+                strict_yaml.load(path)
+        else:
+            strict_yaml.overrides(*options.configfile)
+    except strict_yaml.FileError as error:
+        fail(f"{error} (paths begin in {Path.cwd()})")
+    if values and "study" not in values and not options.configfile:
+        fail("--config does not name its study (study=...): the results would be the paper's")
 
 
 def quote_interpreter():

@@ -85,11 +85,9 @@ def running(folder: Path, cpus: int) -> Iterator[dict[str, str]]:
     try:
         for command in (munged, ["slurmctld", "-D"], ["slurmd", "-D"]):
             with (folder / f"{command[0]}.out").open("wb") as out:
-                daemons.append(
-                    subprocess.Popen(command, env=environment, stdout=out, stderr=out)
-                )
+                daemons.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
             if command is munged:
-                _wait(lambda: (folder / "munge.socket").exists(), daemons, folder)
+                _wait((folder / "munge.socket").exists, daemons, folder)
         _wait(lambda: _idle(environment), daemons, folder)
         yield environment
     finally:

@@ -44,6 +44,13 @@ def test_the_paper_is_wise():
     assert validation.advice(validation.check(PAPER)) == []
 
 
+ODD_NAMES = [
+    "", "<x>", "x}", "{x}", "a/b", "..", ".x", " x", "x ", "-n", "a\\b", "$HOME", "a'b", 'a"b', "a*",
+    "a\nb", "a\x1b[2Jb", "x" * 81, "x" * 300, "Höhe", "<!--<script ", "a;b",
+]  # fmt: skip
+SWEEP = {"over": {"echo.snr_db": [1.0]}, "realizations": 1, "base": {}}
+
+
 @pytest.mark.parametrize(
     ("change", "key", "says"),
     [
@@ -55,7 +62,15 @@ def test_the_paper_is_wise():
         ({"figures__formats": ["png", "png"]}, "figures.formats", "each format once"),
         ({"figures__formats": ["jpg"]}, "figures.formats[0]", "'pdf', 'svg' or 'png'"),
         ({"seed": -1}, "seed", "greater than or equal to 0"),
-        ({"study": "a/b"}, "study", "match pattern"),
+        *(
+            ({section: {name: content} if content is not None else name}, key, "1 to 80 letters")
+            for name in ODD_NAMES
+            for section, content, key in (
+                ("study", None, "study"),
+                ("variants", {"seed": 1}, f"variants.{name}"),
+                ("sweeps", SWEEP, f"sweeps.{name}"),
+            )
+        ),
         ({"scene__terrain": "peak"}, "scene.terrain", "'peaks', 'flat' or 'file'"),
         ({"radar__stop_frequency_hz": "15e9"}, "radar.stop_frequency_hz", "write 15000000000"),
         ({"radar__stop_frequency_hz": 12e9}, "radar.stop_frequency_hz", "must exceed"),
@@ -270,7 +285,7 @@ def test_an_aperture_that_points_into_the_image_is_advised_against():
 def test_files_override_in_order(tmp_path):
     first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
     first.write_text("seed: 1\nradar: {baseline_m: 0.4, rail_height_m: 2.5}\n")
-    second.write_text("radar: {baseline_m: 0.5}\n")
+    second.write_text("study: second\nradar: {baseline_m: 0.5}\n")
     study = validation.load(CONFIG / "paper.yaml", first, second)
     assert (study.seed, study.radar.baseline_m, study.radar.rail_height_m) == (1, 0.5, 2.5)
     assert study.radar.aperture_length_m == 0.8

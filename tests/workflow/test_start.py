@@ -121,7 +121,7 @@ def test_the_study_s_own_defaults_run_no_code_either(place, tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("radar: {baseline_m: 0.2}\n", "mine.yaml does not name its study (study: ...)"),
+        ("radar: {baseline_m: 0.2}\n", "mine.yaml: it does not name its study (study: ...)"),
         ("study: mine\nseed: 1\nseed: 2\n", "mine.yaml, line 3, column 1: the key 'seed'"),
         ("study: mine\nseed: 0401\n", "mine.yaml, line 2, column 7: '0401' is"),
         ("study: mine\n\tseed: 1\n", "mine.yaml, line 2, column 1: "),

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
+from vinsar.foundations.text import Name
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
@@ -51,11 +53,7 @@ class Section(BaseModel):
 class Study(Section):
     """A study: its name, its seed, and the sections that `vinsar.study.composition` adds to it."""
 
-    study: str = key(
-        "name of the study; results go to results/<study>",
-        "ours",
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$",
-    )
+    study: Name = key("name of the study; results go to results/<study>", "ours")
     seed: int = key("seed of everything random", "ours", ge=0)
     realization: int = key("number of the realization of everything random", "ours", ge=0)
     if TYPE_CHECKING:

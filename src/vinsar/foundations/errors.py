@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from vinsar.foundations.text import printable
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -29,7 +31,7 @@ class Fault:
 
     def __str__(self) -> str:
         value = "" if self.value is None else f" = {self.value!r}"
-        return f"{self.key}{value}: {self.allowed}"
+        return printable(f"{self.key}{value}: {self.allowed}")
 
 
 class ConfigurationError(ValueError):

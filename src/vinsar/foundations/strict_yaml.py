@@ -85,6 +85,34 @@ def load(path: str | Path) -> dict[str, Any]:
     return content
 
 
+def overrides(*paths: str | Path) -> list[dict[str, Any]]:
+    """Read the files that make a study of the paper's.
+
+    Parameters
+    ----------
+    paths
+        The files, in the order in which they override each other.
+
+    Returns
+    -------
+    list of dict
+        Keys with their values, of each file.
+
+    Raises
+    ------
+    FileError
+        As of `load`, or if none of them names the study.
+    """
+    read = [load(path) for path in paths]
+    if read and not any("study" in content for content in read):
+        raise FileError(
+            Path(paths[-1]),
+            "it does not name its study (study: ...), so that its results would take the place of "
+            "the paper's",
+        )
+    return read
+
+
 def _text(path: Path) -> str:
     if not path.exists():
         raise FileError(path, "there is no such file")

@@ -2,6 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from pydantic import StringConstraints
+
+NAMED_BY = "1 to 80 letters, digits, spaces and any of _ . , + -, a letter or digit first and last"
+"""How studies, sweeps and variants may be named: it is safe in paths, workflows and pages."""
+
+Name = Annotated[
+    str,
+    StringConstraints(
+        pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.,+-]*[A-Za-z0-9])?$", min_length=1, max_length=80
+    ),
+]
+"""A name of that kind."""
+
 _ASCII = str.maketrans({"─": "-", "│": "|", "├": "+", "└": "+"})
 
 

@@ -571,9 +571,7 @@ class _Problem:
     source: str = ""
 
 
-def _examine(
-    folder: Path, study: Study | None, wanted: Iterable[str]
-) -> dict[str, list[_Problem]]:
+def _examine(folder: Path, study: Study | None, wanted: Iterable[str]) -> dict[str, list[_Problem]]:
     """Return what is wrong with each result of which there is a record, or that is wanted."""
     now = _Now(study)
     shas: dict[str, str | None] = {}

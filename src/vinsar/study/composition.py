@@ -15,6 +15,7 @@ from pydantic import create_model
 
 from vinsar.foundations import configuration
 from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.text import Name
 from vinsar.study import options
 
 if TYPE_CHECKING:
@@ -88,11 +89,11 @@ StudyModel: type[configuration.Study] = create_model(  # type: ignore[call-overl
     __doc__="A whole study.",
     **{name: (section, ...) for name, section in _sections(_MODULES).items()},
     variants=(
-        dict[str, options.Override],
+        dict[Name, options.Override],
         key("overrides by name; `./run variants` tabulates the accuracy of each", "ours"),
     ),
     sweeps=(
-        dict[str, options.Sweep],
+        dict[Name, options.Sweep],
         key("sweeps by name; `./run results/<study>/sweeps/<name>.nc` computes one", "ours"),
     ),
 )

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
+from vinsar.foundations import strict_yaml
 from vinsar.foundations.configuration import Study, models_in
 from vinsar.foundations.errors import ConfigurationError, Fault
+from vinsar.foundations.text import NAMED_BY
 from vinsar.simulation.scene import ELEVATION, SceneObject
 from vinsar.study import checks, composition
 from vinsar.study.composition import StudyModel
@@ -52,18 +54,11 @@ def read(*paths: str | Path) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If a file cannot be read as YAML.
+        If a file cannot be read (`strict_yaml.load`), or none names the study.
     """
-    import yaml
-
     merged: dict[str, Any] = {}
-    for path in map(Path, paths):
-        try:
-            content = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-        except (OSError, yaml.YAMLError) as error:
-            raise ValueError(f"cannot read the configuration {path}: {error}") from error
-        if not isinstance(content, dict):
-            raise ValueError(f"{path} holds {type(content).__name__}; keys with values are needed")
+    first, *others = map(Path, paths)
+    for content in (strict_yaml.load(first), *strict_yaml.overrides(*others)):
         merged = merge(merged, content)
     return merged
 
@@ -86,7 +81,7 @@ def load(*paths: str | Path) -> Study:
     ConfigurationError
         If anything is wrong with it.
     ValueError
-        If a file cannot be read as YAML.
+        If a file cannot be read (`strict_yaml.load`), or none names the study.
     """
     return check(read(*paths))
 
@@ -281,14 +276,16 @@ def _apply(rules: Iterable[Rule], sections: Mapping[str, Any]) -> Iterator[Fault
 def _fault(error: Any) -> Fault:
     path = ""
     for part in error["loc"]:
-        if path.endswith("]") and part in _SHAPES:
-            continue  # pydantic's word for which of the shapes it is, not a key
+        if (path.endswith("]") and part in _SHAPES) or part == "[key]":
+            continue  # pydantic's word for which of the shapes, or for a key itself
         path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
     value = error["input"]
     if error["type"] == "missing":
         return Fault(path, None, "missing; config/paper.yaml shows it with its value")
     if error["type"] == "extra_forbidden":
         return Fault(path, value, "unknown key" + _nearest(path))
+    if error["type"].startswith("string_"):
+        return Fault(path, value, f"must be {NAMED_BY}")
     allowed = error["msg"].replace("Input should", "must").replace("String should", "must")
     if isinstance(value, str) and error["type"] in {"float_type", "int_type"}:
         try:

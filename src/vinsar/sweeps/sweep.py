@@ -266,12 +266,25 @@ def _refuse_idle(study: Study, name: str) -> None:
         ):
             advice = "no stage of a case reads it, so all its values would give the same result"
             faults.append(Fault(where, None, advice))
-        count = Counter(_text(float(v) if _is_number(v) else v) for v in values)
+        for other in study.sweeps[name].over:
+            if f"{key}.".startswith(f"{other}.") and key != other:
+                advice = f"is within {other}, which is swept as well: one would hide the other"
+                faults.append(Fault(where, None, advice))
+        count = Counter(_text(_number_by_value(value)) for value in values)
         twice = [text for text, times in count.items() if times > 1]
         if twice:
             faults.append(Fault(where, ", ".join(twice), "stands there more than once"))
     if faults:
         raise ConfigurationError(faults)
+
+
+def _number_by_value(value: Any) -> Any:
+    """Return a value in which equal numbers look alike: 1 and 1.0, 0.0 and -0.0."""
+    if isinstance(value, dict):
+        return {key: _number_by_value(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_number_by_value(part) for part in value]
+    return float(value) + 0.0 if _is_number(value) else value
 
 
 def _is_number(value: Any) -> bool:
