@@ -45,8 +45,8 @@ def test_the_paper_is_wise():
 
 
 ODD_NAMES = [
-    "", "<x>", "x}", "{x}", "a/b", "..", ".x", " x", "x ", "-n", "a\\b", "$HOME", "a'b", 'a"b', "a*",
-    "a\nb", "a\x1b[2Jb", "x" * 81, "x" * 300, "Höhe", "<!--<script ", "a;b",
+    "", "<x>", "x}", "{x}", "a/b", "..", ".x", " x", "x ", "-n", "a\\b", "$HOME", "a'b", 'a"b',
+    "a*", "a\nb", "a\x1b[2Jb", "x" * 81, "x" * 300, "Höhe", "<!--<script ", "a;b",
 ]  # fmt: skip
 SWEEP = {"over": {"echo.snr_db": [1.0]}, "realizations": 1, "base": {}}
 
