@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,8 @@ from vinsar.radar import grid
 from vinsar.simulation import scene
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -24,6 +27,9 @@ if TYPE_CHECKING:
 
 # Where the raster is coarse, the edges of shadows still are to be sharp.
 _FEWEST_RAYS = 800
+
+# Cells of a grid that are interpolated at a time.
+_CELLS_AT_ONCE = 1 << 18
 
 
 SHADOW = Variable(
@@ -83,6 +89,19 @@ def visible_points(terrain: xr.Dataset, antennas: Floats, points: Floats) -> Fla
         If an antenna is not before the terrain, a position is not finite, or the points are not
         sorted by y.
     """
+    look = _looking(terrain, antennas, points)
+    visible = np.empty((len(antennas), len(points)), dtype=bool)
+    blocks.run(
+        lambda index: look(antennas[index], visible[index]),
+        ((index,) for index in range(len(antennas))),
+    )
+    return visible
+
+
+def _looking(
+    terrain: xr.Dataset, antennas: Floats, points: Floats
+) -> Callable[[Floats, Flags], None]:
+    """Return a function that marks the points in sight of one of the antennas."""
     from vinsar.kernels import fan
 
     x, y = terrain["x"].values, terrain["y"].values
@@ -99,20 +118,56 @@ def visible_points(terrain: xr.Dataset, antennas: Floats, points: Floats) -> Fla
     if np.any(np.diff(points[:, 1]) < 0):
         raise ValueError("the points are not sorted by y")
     columns = np.ascontiguousarray(points.T, dtype=float)
-    visible = np.empty((len(antennas), len(points)), dtype=bool)
     # Rays a raster cell apart at the far edge, where they are widest apart.
     spread = (x[-1] - x[0]) / (y[0] - antennas[:, 1].max())
     spacing = (x[1] - x[0]) / (y[-1] - antennas[:, 1].min())
     rays = max(_FEWEST_RAYS, int(np.ceil(spread / spacing)) + 1)
 
-    def work(index: int) -> None:
+    def look(antenna: Floats, visible: Flags) -> None:
         fan.sweep(
-            height, x[0], x[1] - x[0], y[0], y[1] - y[0], antennas[index], columns, rays,
-            visible[index],
+            height, x[0], x[1] - x[0], y[0], y[1] - y[0], antenna, columns, rays, visible
         )  # fmt: skip
 
-    blocks.run(work, ((index,) for index in range(len(antennas))))
-    return visible
+    return look
+
+
+def _each_channel(
+    terrain: xr.Dataset,
+    trajectory: xr.Dataset,
+    points: Floats,
+    take: Callable[[int, int, Flags], None],
+) -> None:
+    """Call ``take(channel, position, flags)`` with what both ends see: all of it is too much.
+
+    The calls come from several threads, and the flags are theirs for the call alone.
+    """
+    transmitter, receiver = trajectory["transmitter"].values, trajectory["receiver"].values
+    channels, positions = transmitter.shape[:2]
+    antennas, where = np.unique(
+        np.concatenate([transmitter, receiver]).reshape(-1, 3), axis=0, return_inverse=True
+    )
+    ends = where.reshape(2, channels, positions)
+    look = _looking(terrain, antennas, points)
+
+    def flags(index: int) -> Flags:
+        seen = np.empty(len(points), dtype=bool)
+        look(antennas[index], seen)
+        return seen
+
+    # An antenna that stands still while another moves is asked once.
+    still = {int(part[0]) for part in ends.reshape(-1, positions) if (part == part[0]).all()}
+    standing = {index: flags(index) for index in sorted(still)}
+
+    def work(position: int) -> None:
+        seen = dict(standing)
+        for channel in range(channels):
+            out, back = (int(index) for index in ends[:, channel, position])
+            for index in (out, back):
+                if index not in seen:
+                    seen[index] = flags(index)
+            take(channel, position, seen[out] if out == back else seen[out] & seen[back])
+
+    blocks.run(work, ((position,) for position in range(positions)))
 
 
 def channel_visibility(terrain: xr.Dataset, trajectory: xr.Dataset, points: Floats) -> Flags:
@@ -132,14 +187,39 @@ def channel_visibility(terrain: xr.Dataset, trajectory: xr.Dataset, points: Floa
     ndarray of bool, shape (channel, position, point)
         True where transmitter and receiver both see the point.
     """
-    transmitter, receiver = trajectory["transmitter"].values, trajectory["receiver"].values
-    antennas, where = np.unique(
-        np.concatenate([transmitter, receiver]).reshape(-1, 3), axis=0, return_inverse=True
-    )
-    seen = visible_points(terrain, antennas, points)
-    channels, positions = transmitter.shape[:2]
-    out, back = where.reshape(2, channels, positions)
-    return np.asarray(seen[out] & seen[back])
+    visible = np.empty((*trajectory["transmitter"].shape[:2], len(points)), dtype=bool)
+
+    def take(channel: int, position: int, flags: Flags) -> None:
+        visible[channel, position] = flags
+
+    _each_channel(terrain, trajectory, points, take)
+    return visible
+
+
+def visible_share(terrain: xr.Dataset, trajectory: xr.Dataset, points: Floats) -> Floats:
+    """Return the share of the antenna positions at which each channel sees points.
+
+    Parameters
+    ----------
+    terrain, trajectory, points
+        As of `channel_visibility`, whose flags take many times the memory.
+
+    Returns
+    -------
+    ndarray, shape (channel, point)
+        From 0 to 1.
+    """
+    channels, positions = trajectory["transmitter"].shape[:2]
+    counts = np.zeros((channels, len(points)), dtype=np.uint32)
+    turn = threading.Lock()
+
+    def take(channel: int, position: int, flags: Flags) -> None:
+        del position
+        with turn:
+            counts[channel] += flags
+
+    _each_channel(terrain, trajectory, points, take)
+    return counts / positions
 
 
 def facet_visibility(terrain: xr.Dataset, facets: xr.Dataset, trajectory: xr.Dataset) -> xr.Dataset:
@@ -178,28 +258,39 @@ def truth_on_grid(terrain: xr.Dataset, trajectory: xr.Dataset, x: Floats, y: Flo
     xarray.Dataset
         Product ``truth``; NaN heights outside the terrain.
     """
-    grid_y, grid_x = np.meshgrid(y, x, indexing="ij")
-    height = scene.sample(terrain["height"], grid_x, grid_y)
-    points = np.stack([grid_x, grid_y, height], axis=-1).reshape(-1, 3)
-    seen = channel_visibility(terrain, trajectory, points)
-    fraction = seen.mean(axis=1).reshape(seen.shape[0], y.size, x.size)
-    edge = terrain["x"].values, terrain["y"].values
-    outside = (
-        (grid_x < edge[0][0] - 1e-9) | (grid_x > edge[0][-1] + 1e-9)
-        | (grid_y < edge[1][0] - 1e-9) | (grid_y > edge[1][-1] + 1e-9)
-    )  # fmt: skip
+    columns = np.empty((3, y.size, x.size))
+    reflectivity = np.empty(columns.shape[1:])
+    for rows in _row_blocks(y.size, x.size):
+        columns[1, rows], columns[0, rows] = np.meshgrid(y[rows], x, indexing="ij")
+        place = columns[0, rows], columns[1, rows]
+        columns[2, rows] = scene.sample(terrain["height"], *place)
+        reflectivity[rows] = scene.sample(terrain["reflectivity"], *place)
+    fraction = visible_share(terrain, trajectory, columns.reshape(3, -1).T)
+    fraction = fraction.reshape(-1, y.size, x.size)
+    inside = [
+        (axis > own[0] - 1e-9) & (axis < own[-1] + 1e-9)
+        for axis, own in ((y, terrain["y"].values), (x, terrain["x"].values))
+    ]
+    outside = ~(inside[0][:, np.newaxis] & inside[1])
+    height = columns[2]
+    for values in (height, reflectivity):
+        values[outside] = np.nan
     return variables.dataset(
         "truth",
         {
-            "height": np.where(outside, np.nan, height),
-            "reflectivity": np.where(
-                outside, np.nan, scene.sample(terrain["reflectivity"], grid_x, grid_y)
-            ),
+            "height": height,
+            "reflectivity": reflectivity,
             "visible_fraction": fraction,
             "shadow": (fraction < 0.5).any(axis=0) & ~outside,
         },
         {"x": x, "y": y},
     )
+
+
+def _row_blocks(rows: int, columns: int) -> list[slice]:
+    """Return slices of rows with so many cells that what is computed of them takes little."""
+    step = max(1, _CELLS_AT_ONCE // columns)
+    return [slice(begin, begin + step) for begin in range(0, rows, step)]
 
 
 def _visibility(products: Products, study: Study) -> xr.Dataset:
