@@ -31,7 +31,11 @@ class Checkout:
 
     def copy(self, folder: Path) -> "Checkout":
         """Return a copy with its results, to be asked and to be spoilt."""
-        shutil.copytree(self.folder, folder, ignore=shutil.ignore_patterns(".snakemake"))
+        # With what Snakemake knows of the results, or it would make them again.
+        ignored = shutil.ignore_patterns("log", "locks", "running", "scripts")
+        shutil.copytree(self.folder, folder, ignore=lambda place, names: (
+            ignored(place, names) if place.endswith(".snakemake") else ()
+        ))  # fmt: skip
         return Checkout(folder)
 
     def snakemake(self, *arguments: str, extra: str = "") -> subprocess.CompletedProcess[str]:

@@ -56,7 +56,7 @@ EDITS = {
     "terrain.nc": lambda record: record["provenance"].update(vinsar_configuration="{}"),
     "images.nc": lambda record: record.pop("provenance"),
     "claims.md": lambda record: record.pop("digest"),
-    "figures/fig1.png": lambda record: record["inputs"].clear(),
+    "figures/fig1.png": lambda record: record.update(threads=99),
     "accuracy.json": lambda record: record.clear(),
 }
 
