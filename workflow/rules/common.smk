@@ -13,7 +13,7 @@ from vinsar.paper import claims, likeness
 from vinsar.prediction import systems
 from vinsar.results import provenance
 from vinsar.simulation.scene import ELEVATION
-from vinsar.study import composition, ingest, pipeline, validation
+from vinsar.study import composition, ingest, pipeline, validation, work
 from vinsar.sweeps import sweep
 
 try:
@@ -28,6 +28,8 @@ except ConfigurationError as error:
 
 for sentence in validation.advice(STUDY):
     logger.warning(f"Configuration: {sentence}")
+if workflow.is_main_process:
+    logger.info(f"Work: {work.sentence(STUDY)}")
 
 
 def configuration(*sections):

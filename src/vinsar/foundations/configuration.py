@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar, cast, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
 from vinsar.foundations.text import Name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+
+_LEAST, _MOST = 1e-30, 1e30
 
 
 def key(description: str, paper: str, **bounds: Any) -> Any:
@@ -43,6 +46,14 @@ class Section(BaseModel):
     )
 
     section_name: ClassVar[str] = ""
+
+    @field_validator("*")
+    @classmethod
+    def _within_reason(cls, value: Any) -> Any:
+        # Squares of what is larger, or smaller, are no numbers any more.
+        if isinstance(value, float) and value != 0 and not _LEAST < abs(value) < _MOST:
+            raise ValueError(f"must be 0 or from {_LEAST:g} to {_MOST:g} in size")
+        return value
 
     def __init_subclass__(cls, name: str = "", **kwargs: Any) -> None:
         """Remember the section's name in a study."""

@@ -116,14 +116,15 @@ def workflow_files() -> list[Path]:
         If the working folder is not the repository, or a link in it leads elsewhere.
     """
     found = [Path(name) for name in _RUN_BY if Path(name).is_file()]
+    # A link may stay among them.
+    homes = [Path(name).resolve() for name in _RUN_FROM]
     for name in _RUN_FROM:
         if not Path(name).is_dir():
             raise ValueError(f"{Path.cwd()} has no folder {name}; start in the repository")
-        home = Path(name).resolve()
         for path in Path(name).rglob("*"):
             if path.is_file() and "__pycache__" not in path.parts and path.name[0] != ".":
-                if not path.resolve().is_relative_to(home):
-                    raise ValueError(f"{path} is a link that leads out of {name}; remove it")
+                if not any(map(path.resolve().is_relative_to, homes)):
+                    raise ValueError(f"{path} is a link that leads out of the sources; remove it")
                 found.append(path)
     return sorted(found)
 

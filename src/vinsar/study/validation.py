@@ -21,7 +21,7 @@ from vinsar.foundations.configuration import Study, models_in
 from vinsar.foundations.errors import ConfigurationError, Fault
 from vinsar.foundations.text import NAMED_BY
 from vinsar.simulation.scene import ELEVATION, SceneObject
-from vinsar.study import checks, composition
+from vinsar.study import checks, composition, work
 from vinsar.study.composition import StudyModel
 from vinsar.study.options import SIMULATION
 
@@ -131,7 +131,7 @@ def check(raw: Mapping[str, Any]) -> Study:
         }
     valid = _meaningful(valid)
     # A section that is wrong by itself would only confuse the rules that come after.
-    for rules in (composition.CHECKS, *checks.CHECKS):
+    for rules in (work.CHECKS, composition.CHECKS, *checks.CHECKS):
         found = list(_apply(rules, valid))
         faults += found
         for fault in found:
