@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from vinsar.foundations.errors import ConfigurationError
-from vinsar.study import validation
+from vinsar.study import validation, work
 
 CONFIG = Path(__file__).parents[2] / "config"
 PAPER = yaml.safe_load((CONFIG / "paper.yaml").read_text())
@@ -14,6 +14,17 @@ PIT = {"shape": "pit", "x_m": 0.0, "y_m": 12.0, "diameter_m": 0.5, "depth_m": 0.
 MOUND = {"shape": "mound", "x_m": 0.0, "y_m": 12.0, "diameter_m": 0.5, "height_m": 0.2}
 PATCH = {"x_m": 0.0, "y_m": 12.0, "size_x_m": 0.5, "size_y_m": 0.5, "reflectivity": 1.0}
 RECTANGLE = {"x_min_m": -1.0, "x_max_m": 1.0, "y_min_m": 10.5, "y_max_m": 11.0}
+
+
+BETWEEN = {"x_min_m": 0.001, "x_max_m": 0.019, "y_min_m": 12.001, "y_max_m": 12.019}
+POINT = {"x_m": 0.0, "y_m": 12.0, "height_m": 0.0}
+CONTROLLED = PAPER["height"] | {"reference": "control_points"}
+BLACK = {"x_m": 0.0, "y_m": 13.0, "size_x_m": 5.0, "size_y_m": 6.0, "reflectivity": 0.0}
+
+
+@pytest.fixture(autouse=True)
+def _a_machine_of_16_gb(monkeypatch):
+    monkeypatch.setattr(work, "memory", lambda: 16e9)
 
 
 def changed(**values):
@@ -38,6 +49,23 @@ def faults(raw) -> dict[str, str]:
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_shipped_study_is_valid(path):
     assert validation.load(CONFIG / "paper.yaml", path).study == path.stem
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"scene__facet_jitter": 0.0}, "scatter like a crystal"),
+        ({"echo__snr_db": -40.0}, "coherence of 0.0001"),
+        ({"radar__baseline_m": 1.0e-6}, "shorter than the wavelength"),
+        ({"radar__position_spacing_m": 0.4, "radar__system": "receive_pair",
+          "outputs__claims": False}, "an aperture of 3 positions"),
+        ({"height__level_ground_height_m": 1.5}, "is off the terrain, -0.3 to 0.3 m"),
+        ({"height": CONTROLLED | {"control_points": [POINT | {"height_m": -2.0}]}}, "off the"),
+    ],
+)  # fmt: skip
+def test_nonsense_that_is_allowed_has_a_word_of_its_own(change, says):
+    said = validation.advice(validation.check(changed(**change)))
+    assert any(says in sentence for sentence in said), said
 
 
 def test_the_paper_is_wise():
@@ -114,6 +142,68 @@ SWEEP = {"over": {"echo.snr_db": [1.0]}, "realizations": 1, "base": {}}
         ),
         ({"scene__objects": [PIT | {"depth_m": 2.0}]}, "scene.objects[0].depth_m", "below radar"),
         ({"scene__objects": [BOX | {"height_m": 2.0}]}, "scene.objects[0].height_m", "below radar"),
+        ({"scene__objects": [BOX | {"height_m": 1.8}]}, "scene.objects[0].height_m", "the 0.3 m"),
+        (
+            {"scene__objects": [BOX | {"height_m": 0.9}, BOX | {"x_m": 0.4, "height_m": 0.9}]},
+            "scene.objects[1].height_m",
+            "with the 1.2 m beneath it be below",
+        ),
+        (
+            {"scene__peak_height_m": 2.5, "scene__reflectivity_offset": 3.0},
+            "scene.peak_height_m",
+            "must be below radar.rail_height",
+        ),
+        ({"radar__stop_frequency_hz": 13.0e9 + 1}, "radar.stop_frequency_hz", "resolves 1.5e+08 m"),
+        ({"interferogram__coherence_window_px": 9999}, "interferogram.coherence_window_px", "251"),
+        (
+            {"filtering__method": "boxcar", "filtering__boxcar_window_px": 9999},
+            "filtering.boxcar_window_px",
+            "at most 251",
+        ),
+        ({"filtering__goldstein_patch_px": 512}, "filtering.goldstein_patch_px", "at most 301"),
+        ({"height__level_ground": [BETWEEN]}, "height.level_ground[0]", "holds 0 x 0 pixels"),
+        ({"height__level_ground_height_m": 100.0}, "height.level_ground_height_m", "to 2 m"),
+        ({"height__level_ground_height_m": -100.0}, "height.level_ground_height_m", "-8.3 to"),
+        (
+            {"height": CONTROLLED | {"control_points": [POINT | {"height_m": 50.0}]}},
+            "height.control_points[0].height_m",
+            "below the antennas",
+        ),
+        *(
+            (
+                {"height": CONTROLLED | {"trend": "plane", "control_points": points}},
+                "height.control_points",
+                "in one line",
+            )
+            for points in (
+                [POINT] * 3,
+                [POINT | {"x_m": x, "y_m": 12.0 + x} for x in (-1.0, 0.0, 0.5, 1.0)],
+            )
+        ),
+        ({"registration__height_max_m": 1.0e6}, "registration.height_max_m", "below radar.rail"),
+        ({"registration__map_height_m": 2.0}, "registration.map_height_m", "below radar.rail"),
+        (
+            {"vehicle__speed_correction": "sensor", "vehicle__speed_error_m_per_s": 60.0},
+            "vehicle.speed_error_m_per_s",
+            "at most 9.97 m/s",
+        ),
+        ({"scene__patches": [BLACK]}, "scene.patches[0].reflectivity", "no echo"),
+        ({"radar__position_spacing_m": 0.8}, "radar.position_spacing_m", "makes 2 positions"),
+        ({"imaging__grid_spacing_m": 0.0001}, "imaging.grid_spacing_m", "GB in 'images'"),
+        ({"scene__terrain_spacing_m": 1.0e-6}, "scene.terrain_spacing_m", "GB in 'terrain'"),
+        ({"scene__facet_size_m": 1.0e-5}, "scene.facet_size_m", "GB in 'facets'"),
+        ({"scene__facet_size_m": 9.0e-4}, "scene.facet_size_m", "GB in 'visibility'"),
+        ({"radar__frequency_count": 10_000_001}, "radar.frequency_count", "GB in 'profiles'"),
+        ({"radar__position_spacing_m": 8.0e-10}, "radar.position_spacing_m", "GB in 'trajectory'"),
+        ({"filtering__goldstein_patch_px": 10**6}, "filtering.goldstein_patch_px", "in 'filtered'"),
+        ({"registration__height_count": 10**9}, "registration.height_count", "in 'registration'"),
+        (
+            {"sweeps": {"noise": SWEEP | {"realizations": 30_000_000}}},
+            "sweeps.noise.realizations",
+            "makes 3e+07 cases of the sweep 'noise', about 240 GB",
+        ),
+        ({"radar__baseline_m": 1.0e300}, "radar.baseline_m", "from 1e-30 to 1e+30"),
+        ({"radar__position_spacing_m": 1.0e-300}, "radar.position_spacing_m", "from 1e-30"),
         ({"scene__objects": [MOUND | {"height_m": 0.3}]}, "scene.objects[0].height_m", "0.25 m"),
         ({"scene__objects": [PIT | {"diameter_m": 0.01}]}, "scene.objects[0].diameter_m", "0.02 m"),
         ({"scene__patches": [PATCH | {"size_x_m": 6.0}]}, "scene.patches[0].x_m", "in the scene"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from contextlib import suppress
 from functools import cache
 from typing import TYPE_CHECKING, Literal
@@ -10,12 +11,13 @@ import numpy as np
 
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import Section, key
+from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
 from vinsar.processing import interferogram
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -26,6 +28,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
 
+_NO_SNAPHU = (
+    "snaphu is not installed, as its solver is free for non-commercial use only; install it into "
+    ".venv with pip (package `snaphu`), or take `unwrapping.method: whirlwind`"
+)
 
 variables.declare(
     "unwrapped",
@@ -124,10 +130,7 @@ def _snaphu(values: Complexes, coherence: Floats, looks: float) -> Floats:
     try:
         import snaphu
     except ImportError:
-        raise ValueError(
-            "snaphu is not installed, as its solver is free for non-commercial use only; install "
-            "it into .venv with pip (package `snaphu`), or take `unwrapping.method: whirlwind`"
-        ) from None
+        raise ValueError(_NO_SNAPHU) from None
     unwrapped, _ = snaphu.unwrap(
         values.astype(np.complex64), coherence.astype(np.float32), nlooks=looks, cost="smooth"
     )
@@ -208,3 +211,11 @@ STAGES = {
         sections=(*interferogram.LOOKS_KEYS, "unwrapping"),
     ),
 }
+
+
+def _installed(unwrapping: Unwrapping) -> Iterator[Fault]:
+    if unwrapping.method == "snaphu" and importlib.util.find_spec("snaphu") is None:
+        yield Fault("unwrapping.method", "snaphu", _NO_SNAPHU)
+
+
+CHECKS = (_installed,)

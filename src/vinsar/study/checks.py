@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from vinsar.evaluation.misregistration import Registration
+    from vinsar.processing.filtering import Filtering
     from vinsar.processing.focusing import Imaging
     from vinsar.processing.height import Height
+    from vinsar.processing.interferogram import Interferogram
     from vinsar.processing.leakage import Suppression
     from vinsar.radar.motion import Vehicle
     from vinsar.radar.trajectory import Radar
@@ -57,17 +59,174 @@ def _ahead(radar: Radar, scene: Scene, imaging: Imaging) -> Iterator[Fault]:
             )
 
 
-def _object_heights(radar: Radar, scene: Scene) -> Iterator[Fault]:
+def _tops_below_antennas(radar: Radar, scene: Scene) -> Iterator[Fault]:
+    limit = f"radar.rail_height_m, {radar.rail_height_m:g} m: what is as high hides all behind it"
+    ground = scene.peak_height_m if scene.terrain == "peaks" else 0.0
+    if ground >= radar.rail_height_m:
+        yield Fault("scene.peak_height_m", ground, f"must be below {limit}")
+        return
     for number, part in enumerate(scene.objects):
-        for key in ("height_m", "depth_m"):
-            value = getattr(part, key, 0.0)
-            if value >= radar.rail_height_m:
-                yield Fault(
-                    f"scene.objects[{number}].{key}",
-                    value,
-                    f"must be below radar.rail_height_m, {radar.rail_height_m:g} m: what "
-                    "is as high hides all behind it",
+        where = f"scene.objects[{number}]"
+        height, depth = (getattr(part, name, 0.0) for name in ("height_m", "depth_m"))
+        if depth >= radar.rail_height_m:
+            yield Fault(f"{where}.depth_m", depth, f"must be below {limit}")
+        # What overlaps is added up.
+        others = sum(getattr(other, "height_m", 0.0) for other in scene.objects[:number]
+                     if _overlap(part, other))  # fmt: skip
+        if height > 0 and ground + others + height >= radar.rail_height_m:
+            upon = f" with the {ground + others:g} m beneath it" if ground + others else ""
+            yield Fault(f"{where}.height_m", height, f"must{upon} be below {limit}")
+
+
+def _overlap(one: Any, other: Any) -> bool:
+    """Tell whether two objects may stand upon each other."""
+    return all(
+        abs(getattr(one, f"{axis}_m") - getattr(other, f"{axis}_m")) < sum(reaches)
+        for axis, reaches in zip("xy", zip(one.reach(), other.reach(), strict=True), strict=True)
+    )
+
+
+def _band_resolves(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
+    derived = _Derived.of(radar)
+    near, far = derived.reach(imaging)
+    if derived.range_cell > far - near:
+        yield Fault(
+            "radar.stop_frequency_hz",
+            radar.stop_frequency_hz,
+            f"a band of {radar.stop_frequency_hz - radar.start_frequency_hz:.3g} Hz resolves "
+            f"{derived.range_cell:.3g} m in range, more than the {far - near:.3g} m of the image",
+        )
+
+
+def _windows_in_image(
+    imaging: Imaging, filtering: Filtering, interferogram: Interferogram
+) -> Iterator[Fault]:
+    shape = _pixels(imaging)
+    for section, name, options in (
+        ("interferogram", "coherence_window_px", interferogram),
+        *((("filtering", "boxcar_window_px", filtering),) if filtering.method == "boxcar" else ()),
+    ):
+        if getattr(options, name) > min(shape):
+            yield Fault(
+                f"{section}.{name}",
+                getattr(options, name),
+                f"must be at most {min(shape)}, the pixels of the image's shorter side",
+            )
+    if filtering.method == "goldstein" and filtering.goldstein_patch_px > max(shape):
+        yield Fault(
+            "filtering.goldstein_patch_px",
+            filtering.goldstein_patch_px,
+            f"must be at most {max(shape)}, the pixels of the image's longer side",
+        )
+
+
+def _pixels(imaging: Imaging) -> tuple[int, int]:
+    x, y = grid.image_axes(imaging)
+    return x.size, y.size
+
+
+def _reference_determines(radar: Radar, imaging: Imaging, height: Height) -> Iterator[Fault]:
+    top = radar.rail_height_m
+    if height.reference == "level_ground":
+        axes = dict(zip("xy", grid.image_axes(imaging), strict=True))
+        for number, part in enumerate(height.level_ground):
+            inside = [
+                int(
+                    (
+                        (axis >= getattr(part, f"{name}_min_m"))
+                        & (axis <= getattr(part, f"{name}_max_m"))
+                    ).sum()
                 )
+                for name, axis in axes.items()
+            ]
+            least = 2 if height.trend == "plane" and len(height.level_ground) == 1 else 1
+            if min(inside) < least:
+                yield Fault(
+                    f"height.level_ground[{number}]",
+                    None,
+                    f"holds {inside[0]} x {inside[1]} pixels; it must hold {least} x {least} at "
+                    "least, or imaging.grid_spacing_m be smaller",
+                )
+        near = min((part.y_min_m for part in height.level_ground), default=imaging.y_min_m)
+        if not _has_image(height.level_ground_height_m, near, top):
+            yield Fault(
+                "height.level_ground_height_m",
+                height.level_ground_height_m,
+                f"must be below the antennas and leave the ground an image: from "
+                f"{top - float(np.hypot(near, top)):.3g} to {top:g} m",
+            )
+        return
+    for number, point in enumerate(height.control_points):
+        if not _has_image(point.height_m, point.y_m, top):
+            yield Fault(
+                f"height.control_points[{number}].height_m",
+                point.height_m,
+                f"must be below the antennas and leave the point an image: from "
+                f"{top - float(np.hypot(point.y_m, top)):.3g} to {top:g} m",
+            )
+    if height.trend == "plane" and len(height.control_points) >= 3:
+        places = np.array([(point.x_m, point.y_m) for point in height.control_points])
+        spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+        if spread[1] < grid.pixel_side(imaging):
+            yield Fault(
+                "height.control_points",
+                None,
+                "must not lie in one line for height.trend 'plane', which they leave to turn",
+            )
+
+
+def _has_image(height: float, ahead: float, antenna: float) -> bool:
+    """Tell whether a point has the slant range of some point of the ground ahead."""
+    return height < antenna and ahead**2 + antenna**2 > (antenna - height) ** 2
+
+
+def _heights_below_antennas(radar: Radar, registration: Registration) -> Iterator[Fault]:
+    for name in ("height_max_m", "map_height_m"):
+        if getattr(registration, name) >= radar.rail_height_m:
+            yield Fault(
+                f"registration.{name}",
+                getattr(registration, name),
+                f"must be below radar.rail_height_m, {radar.rail_height_m:g} m",
+            )
+
+
+def _told_short(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) -> Iterator[Fault]:
+    if vehicle.speed_correction != "sensor":
+        return
+    # Beyond four standard deviations lies one draw in 30,000.
+    told = vehicle.forward_speed_m_per_s + 4 * vehicle.speed_error_m_per_s
+    room = min(scene.y_min_m, imaging.y_min_m) - _Derived.of(radar).foremost - scene.facet_size_m
+    if told * vehicle.scan_duration_s / 2 > room > 0:
+        most = (2 * room / vehicle.scan_duration_s - vehicle.forward_speed_m_per_s) / 4
+        yield Fault(
+            "vehicle.speed_error_m_per_s",
+            vehicle.speed_error_m_per_s,
+            f"must be at most {max(most, 0):.3g} m/s, or imaging is told that the vehicle drives "
+            "into the scene",
+        )
+
+
+def _something_scatters(scene: Scene) -> Iterator[Fault]:
+    for number, patch in enumerate(scene.patches):
+        covers = patch.rotation_deg == 0 and all(
+            getattr(patch, f"{axis}_m") - reach <= getattr(scene, f"{axis}_min_m")
+            and getattr(patch, f"{axis}_m") + reach >= getattr(scene, f"{axis}_max_m")
+            for axis, reach in zip("xy", patch.reach(), strict=True)
+        )
+        if covers and patch.reflectivity == 0 and number == len(scene.patches) - 1:
+            yield Fault(
+                f"scene.patches[{number}].reflectivity", 0.0, "covers all of the scene: no echo"
+            )
+
+
+def _path_of_positions(radar: Radar, outputs: Outputs) -> Iterator[Fault]:
+    positions = _Derived.of(radar).antennas.sizes["position"]
+    if positions < 3 and "fig2" in outputs.figures:
+        yield Fault(
+            "radar.position_spacing_m",
+            radar.position_spacing_m,
+            f"makes {positions} positions; the point targets of fig2 need 3 at least",
+        )
 
 
 def _reference_in_image(height: Height, imaging: Imaging) -> Iterator[Fault]:
@@ -342,12 +501,74 @@ def _image_in_scene(scene: Scene, imaging: Imaging) -> Iterator[Fault]:
         )
 
 
+def _facets_like_a_crystal(scene: Scene) -> Iterator[Fault]:
+    if scene.facet_jitter < 0.5:
+        yield Fault(
+            "scene.facet_jitter",
+            scene.facet_jitter,
+            "facets in rows scatter like a crystal, not like ground (Bragg resonance); take 1",
+        )
+
+
+def _noise_above_scene(echo: Echo) -> Iterator[Fault]:
+    if echo.snr_db is not None and echo.snr_db < 0:
+        coherence = 1 / (1 + 10 ** (-echo.snr_db / 10))
+        yield Fault(
+            "echo.snr_db",
+            echo.snr_db,
+            f"the noise exceeds the scene and leaves a coherence of {coherence:.2g}: heights, "
+            "obstacles and holes are those of noise",
+        )
+
+
+def _baseline_of_nothing(radar: Radar) -> Iterator[Fault]:
+    wavelength = _Derived.of(radar).wavelength
+    if radar.baseline_m < wavelength:
+        yield Fault(
+            "radar.baseline_m",
+            radar.baseline_m,
+            f"is shorter than the wavelength, {wavelength:.3g} m: the phase hardly tells heights",
+        )
+
+
+def _few_positions(radar: Radar) -> Iterator[Fault]:
+    positions = _Derived.of(radar).antennas.sizes["position"]
+    if positions < 8:
+        yield Fault(
+            "radar.position_spacing_m",
+            radar.position_spacing_m,
+            f"makes an aperture of {positions} positions, whose image is mostly sidelobes",
+        )
+
+
+def _reference_near_ground(scene: Scene, height: Height) -> Iterator[Fault]:
+    if scene.terrain == "file":
+        return
+    peak = scene.peak_height_m if scene.terrain == "peaks" else 0.0
+    low, high = -peak - 3 * scene.roughness_std_m, peak + 3 * scene.roughness_std_m
+    low -= sum(getattr(part, "depth_m", 0.0) for part in scene.objects)
+    high += sum(getattr(part, "height_m", 0.0) for part in scene.objects)
+    told = (
+        {"height.level_ground_height_m": height.level_ground_height_m}
+        if height.reference == "level_ground"
+        else {
+            f"height.control_points[{number}].height_m": point.height_m
+            for number, point in enumerate(height.control_points)
+        }
+    )
+    for key, value in told.items():
+        if not low <= value <= high:
+            yield Fault(
+                key, value, f"is off the terrain, {low:.3g} to {high:.3g} m: all heights shift"
+            )
+
+
 CHECKS = (
     # Antennas in the scene would only confuse the others.
     (_ahead,),
     (
         _reference_in_image,
-        _object_heights,
+        _tops_below_antennas,
         _measured_in_motion,
         _claims_judged,
         _drives_short,
@@ -358,6 +579,13 @@ CHECKS = (
         _gate_before_image,
         _targets_imaged,
         _claims_of_a_rail,
+        _band_resolves,
+        _windows_in_image,
+        _reference_determines,
+        _heights_below_antennas,
+        _told_short,
+        _something_scatters,
+        _path_of_positions,
     ),
 )
 """In groups: what a group finds wrong is kept from the next."""
@@ -370,5 +598,10 @@ ADVICE = (
     _coupling_in_gate,
     _image_in_scene,
     _sides_apart,
+    _facets_like_a_crystal,
+    _noise_above_scene,
+    _baseline_of_nothing,
+    _few_positions,
+    _reference_near_ground,
 )
 """What is allowed but unwise."""
