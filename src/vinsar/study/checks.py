@@ -87,14 +87,14 @@ def _overlap(one: Any, other: Any) -> bool:
 
 
 def _band_resolves(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
-    derived = _Derived.of(radar)
-    near, far = derived.reach(imaging)
-    if derived.range_cell > far - near:
+    near, far = _reach(radar, imaging)
+    cell = waveform.range_resolution(radar.stop_frequency_hz - radar.start_frequency_hz)
+    if cell > far - near:
         yield Fault(
             "radar.stop_frequency_hz",
             radar.stop_frequency_hz,
             f"a band of {radar.stop_frequency_hz - radar.start_frequency_hz:.3g} Hz resolves "
-            f"{derived.range_cell:.3g} m in range, more than the {far - near:.3g} m of the image",
+            f"{cell:.3g} m in range, more than the {far - near:.3g} m of the image",
         )
 
 
@@ -195,7 +195,7 @@ def _told_short(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) 
         return
     # Beyond four standard deviations lies one draw in 30,000.
     told = vehicle.forward_speed_m_per_s + 4 * vehicle.speed_error_m_per_s
-    room = min(scene.y_min_m, imaging.y_min_m) - _Derived.of(radar).foremost - scene.facet_size_m
+    room = min(scene.y_min_m, imaging.y_min_m) - _foremost(radar) - scene.facet_size_m
     if told * vehicle.scan_duration_s / 2 > room > 0:
         most = (2 * room / vehicle.scan_duration_s - vehicle.forward_speed_m_per_s) / 4
         yield Fault(
@@ -220,7 +220,7 @@ def _something_scatters(scene: Scene) -> Iterator[Fault]:
 
 
 def _path_of_positions(radar: Radar, outputs: Outputs) -> Iterator[Fault]:
-    positions = _Derived.of(radar).antennas.sizes["position"]
+    positions = trajectory.planned(radar).sizes["position"]
     if positions < 3 and "fig2" in outputs.figures:
         yield Fault(
             "radar.position_spacing_m",
@@ -522,7 +522,7 @@ def _noise_above_scene(echo: Echo) -> Iterator[Fault]:
 
 
 def _baseline_of_nothing(radar: Radar) -> Iterator[Fault]:
-    wavelength = _Derived.of(radar).wavelength
+    wavelength = _planned(radar).wavelength
     if radar.baseline_m < wavelength:
         yield Fault(
             "radar.baseline_m",
@@ -532,7 +532,7 @@ def _baseline_of_nothing(radar: Radar) -> Iterator[Fault]:
 
 
 def _few_positions(radar: Radar) -> Iterator[Fault]:
-    positions = _Derived.of(radar).antennas.sizes["position"]
+    positions = trajectory.planned(radar).sizes["position"]
     if positions < 8:
         yield Fault(
             "radar.position_spacing_m",
