@@ -6,11 +6,14 @@ in a YAML file, it quotes the path of Python, and it is told which results do no
 
 import functools
 import os
+import re
+import subprocess
 import sys
 from pathlib import Path
 
 import yte
 from snakemake import cli
+from snakemake.resources import Resource
 from snakemake.script import PythonScript
 from snakemake.workflow import Workflow
 
@@ -33,6 +36,8 @@ def main(arguments):
     check_configuration(options)
     if options.executor not in (None, "local", "dryrun", "touch"):
         refuse_unquotable()
+    if options.executor == "slurm":
+        suit_cluster(options)
     if not options.dryrun:
         refuse_read_only(".snakemake", results.FOLDER)
     quote_interpreter()
@@ -119,6 +124,43 @@ def refuse_unquotable():
     if odd:
         shown = " ".join("space" if c == " " else c for c in odd)
         fail(f"jobs of a cluster cannot start in a folder whose path has {shown}: {Path.cwd()}")
+
+
+def suit_cluster(options):
+    """Take as many cores a job as a node has, and ask SLURM in a way that it can answer."""
+    asked = options.default_resources or {}
+    chosen = str(asked["slurm_partition"].value) if "slurm_partition" in asked else None
+    nodes = []
+    for line in answer_of("sinfo", "-h", "-o", "%P %c %m").splitlines():
+        partition, cores, memory = line.split()
+        if chosen in (None, partition.rstrip("*")) and (chosen or partition.endswith("*")):
+            nodes.append((int(cores.rstrip("+")), int(memory.rstrip("+"))))
+    if not nodes:
+        named = f"partition {chosen}" if chosen else "default partition; name one (slurm_partition)"
+        fail(f"SLURM has no {named}")
+    cores, memory = max(nodes)
+    options.cores = options.cores or cores
+    options.max_threads = min(options.max_threads or cores, cores)
+    # A job that asks for more than a node has waits for ever.
+    least = int(0.95 * memory) // cores
+    if "mem_mb_per_cpu" in asked and int(asked["mem_mb_per_cpu"].value) > least:
+        asked["mem_mb_per_cpu"] = Resource("mem_mb_per_cpu", least)
+    if not isinstance(options.slurm_status_command, str):
+        kept = answer_of("scontrol", "show", "config")
+        accounted = re.search(r"^AccountingStorageType *= *(\S+)", kept, re.MULTILINE)
+        none = accounted is None or accounted[1] in ("(null)", "accounting_storage/none")
+        options.slurm_status_command = "squeue" if none else "sacct"
+
+
+def answer_of(*command):
+    """Return what a command of SLURM's says."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    except FileNotFoundError:
+        fail(f"there is no {command[0]} here; ./run --workflow-profile profiles/slurm asks SLURM")
+    if done.returncode:
+        fail(f"SLURM does not answer: {done.stderr.strip()}")
+    return done.stdout
 
 
 def refuse_read_only(*folders):
