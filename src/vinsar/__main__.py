@@ -125,8 +125,8 @@ def _export(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def main() -> int:
-    """Answer a command; return the exit code."""
+def parser() -> argparse.ArgumentParser:
+    """Return what reads the commands."""
     parser = argparse.ArgumentParser(prog="./run", description=__doc__)
     commands = parser.add_subparsers(required=True, metavar="command")
     trace = commands.add_parser("trace", help="what a result comes from, and what has changed")
@@ -163,7 +163,12 @@ def main() -> int:
     measure.add_commands(commands)
     schema = commands.add_parser("schema", help="print the JSON schema of a study's file")
     schema.set_defaults(answer=_schema)
-    arguments = parser.parse_args()
+    return parser
+
+
+def main() -> int:
+    """Answer a command; return the exit code."""
+    arguments = parser().parse_args()
     try:
         return int(arguments.answer(arguments))
     except (ValueError, OSError) as error:

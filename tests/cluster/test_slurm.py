@@ -132,7 +132,8 @@ def test_a_sweep_on_dask_jobqueue_has_the_bits_of_one_thread(environment, tmp_pa
             )  # fmt: skip
 
     expected = run(None)
-    monkeypatch.setattr(os, "environ", environment | {"PYTHONPATH": str(ROOT / "src")})
+    monkeypatch.setenv("SLURM_CONF", environment["SLURM_CONF"])
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "src"))
     monkeypatch.chdir(tmp_path)
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "60s"}),
