@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A finished study of next to nothing, made from heights of the user's own."""
+    """A finished study of next to nothing, made from the user's heights."""
     # In a repository of its own, so that what lies inside it and outside can be told apart.
     for path in ROOT.iterdir():
         if path.name not in {"results", ".snakemake"}:

@@ -1,4 +1,4 @@
-"""Files of the user's own: what is right comes back, what is wrong is one sentence."""
+"""The user's files: what is right comes back, what is wrong is one sentence."""
 
 from __future__ import annotations
 
@@ -310,7 +310,7 @@ def test_a_truncated_file_is_refused(tmp_path, terrain_file, echo_file):
 def test_a_truncated_geotiff_is_refused(tmp_path):
     path = geotiff(tmp_path / "short.tif")
     path.write_bytes(path.read_bytes()[:9000])
-    assert "write or copy it anew" in said(path, lambda: ingest.read(own_terrain(path, **UTM)))
+    assert "write or copy it again" in said(path, lambda: ingest.read(own_terrain(path, **UTM)))
 
 
 # Echoes

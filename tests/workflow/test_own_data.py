@@ -1,4 +1,4 @@
-"""Files of the user's own through the workflow: exported from the tiny study, read as foreign."""
+"""The user's files through the workflow: exported from the tiny study, read as foreign."""
 
 import os
 import shutil
@@ -35,7 +35,7 @@ def ask(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def made(checkout, new_checkout):
-    """A checkout with the tiny study's echo and terrain as files of the user's own."""
+    """A checkout with the tiny study's echo and terrain as the user's files."""
     fresh = new_checkout()
     done = ask(checkout.folder, "export", "results/tiny", str(fresh.folder / "echo.nc"))
     assert done.returncode == 0, done.stderr

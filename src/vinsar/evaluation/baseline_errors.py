@@ -86,7 +86,7 @@ variables.declare(
 
 
 class BaselineErrors(Section, name="baseline_errors"):
-    """Errors of the baseline that the inversion is told (section 1.2, Eqs. 5 and 12)."""
+    """Errors of the baseline that the inversion assumes (section 1.2, Eqs. 5 and 12)."""
 
     length_std_m: float = key("standard deviation of its length", "not given", gt=0, le=0.01)
     angle_std_deg: float = key("standard deviation of its attitude", "not given", gt=0, le=1)
@@ -151,9 +151,9 @@ def angle_errors(
     baseline_m
         Length of the baseline, m.
     length_std_m
-        Standard deviation of the length that the inversion is told, m.
+        Standard deviation of the length that the inversion assumes, m.
     angle_std_deg
-        Standard deviation of the attitude that the inversion is told, deg.
+        Standard deviation of the attitude that the inversion assumes, deg.
     draws
         Draws at each attitude, of each of the two errors.
     rng
@@ -185,7 +185,7 @@ def angle_errors(
         )
         return np.nanstd(height, axis=1)
 
-    # Each attitude has draws of its own: its neighbours show how far chance carries it.
+    # Independent draws for each attitude: the scatter between neighbours shows the sampling error.
     unit = rng.standard_normal((2, angles.size, draws))
     eq5 = formulas.height_per_baseline_length(r1, baseline_m, angles[:, 0], look)
     eq12 = formulas.height_per_baseline_angle(r1, look)

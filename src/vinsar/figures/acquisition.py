@@ -552,6 +552,6 @@ FIGURES = {
 THUMBNAILS = {
     "trajectory": thumbnails.Thumbnail("antenna positions, x and z", _positions),
     "true_trajectory": thumbnails.Thumbnail("where the antennas really were", _positions),
-    "recorded_trajectory": thumbnails.Thumbnail("where imaging is told they were", _positions),
+    "recorded_trajectory": thumbnails.Thumbnail("the positions that focusing uses", _positions),
     "visibility": thumbnails.Thumbnail("facets seen from each position, lower antenna", _visible),
 }

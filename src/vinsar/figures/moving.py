@@ -199,7 +199,7 @@ def predicted_std(
     terrain, truth
         Products of these names.
     true_slope, told_slope
-        Of the true speed and of the one that imaging is told (`motion.slope`).
+        Of the true speed and of the one that focusing assumes (`motion.slope`).
     floor_m
         Error-free standard deviation, m.
 
@@ -291,7 +291,7 @@ FIGURES = {
         title="A vehicle that drives during the scan",
         caption=(
             "(a) Apertures of the slow scan from above, at forward speeds in m/s, and where the "
-            "image lies at half the highest speed of the fast scan if imaging is told of no "
+            "image lies at half the highest speed of the fast scan if focusing assumes no "
             "motion. (b, c) A point target at the image's centre and the height error on visible "
             "ground against the speed, for both scans: not corrected, corrected with the true "
             "speed, and with that of an erroneous sensor. Dotted: amplitude of the target at the "

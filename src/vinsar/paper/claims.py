@@ -1,4 +1,4 @@
-"""The paper's claims, each held against this study's own figures.
+"""The paper's claims, each compared with this study's results.
 
 A claim's criterion is stated in words beside the numbers that decide it; nothing is decided by
 hand.

@@ -1,1 +1,1 @@
-"""What a configuration will do, without running it."""
+"""What a configuration will achieve, without running it."""

@@ -1,7 +1,8 @@
-"""What a configuration will do, predicted from its geometry and waveform without running it.
+"""What a configuration will achieve, predicted from its geometry and waveform without a run.
 
-Resolution, ambiguities and what an error of a path does to a height are the instrument's
-(`vinsar.radar.instrument`), for any arrangement of antennas; here they meet scene, image and noise.
+Resolution, ambiguities and the effect of a path error on a height are properties of the instrument
+(`vinsar.radar.instrument`), for any arrangement of antennas; here they are combined with scene,
+image and noise.
 On the paper's rail the errors of the baseline are Eqs. 5 and 12 with their exact terms.
 """
 
@@ -121,7 +122,7 @@ def filter_looks(
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What an error of the geometry does to heights, and how large it may be.
+    """The effect of an error of the geometry on heights, and how large it may be.
 
     Attributes
     ----------
@@ -238,10 +239,10 @@ class Sheet:
 
         White position errors that give the echoes phases of variance v leave ``s = exp(-v)`` of a
         target's power in focus and spread the rest evenly over all paths' growths from position to
-        position, which a wavelength of growth repeats (`speckle.pixel_coherence`). If both channels
-        share the errors, they show each other's spread targets alike, each at the phase difference
-        of its own place instead of the pixel's: without a change over level ground if the baseline
-        is vertical, otherwise with a mean phase and a coherence of their own.
+        position, which repeats after a wavelength (`speckle.pixel_coherence`). If both channels
+        share the errors, both images contain the same spread targets, each with the phase
+        difference of its own place instead of the pixel's. With a vertical baseline that makes no
+        difference over level ground; otherwise it adds a mean phase and decorrelates.
 
         Parameters
         ----------
@@ -426,7 +427,7 @@ class Sheet:
     def height_per_offset(self, x: ArrayLike, y: ArrayLike, direction: Floats) -> Floats:
         """Return the height error per offset of the upper antenna against the lower, m/m.
 
-        The inversion is told that it stands farther along a direction than it does. Where the
+        The inversion assumes it farther along a direction than it is. Where the
         channels share their receivers or their transmitter, the other end alone has the offset.
 
         Parameters
@@ -452,7 +453,7 @@ class Sheet:
             if np.abs(mine - other).max() > _SAME_M:
                 line = target - mine
                 path -= line @ direction / np.linalg.norm(line, axis=-1)
-        # The difference as told, lower less upper, has to stay as it was measured.
+        # The difference of the assumed paths, lower less upper, has to equal the measured one.
         return self.instrument.height_per_difference(x, y) * path
 
     def _reference(self) -> tuple[Floats, Floats]:
@@ -537,10 +538,10 @@ class Sheet:
         return math.inf
 
     def height_error(self, step: Floats, *, referenced: bool) -> float:
-        """Return by how much a wrongly told upper antenna moves a height of the image, at most.
+        """Return by how much a wrong position of the upper antenna moves a height, at most, m.
 
         The exact inversion of the phases of level ground, on a grid over the image, with the upper
-        one of the antennas that the baseline separates told a step away from where it is.
+        one of the antennas that the baseline separates assumed a step away from where it is.
 
         Parameters
         ----------
@@ -580,7 +581,7 @@ class Sheet:
     def phase_per_position(self, x: ArrayLike, y: ArrayLike, axis: int) -> Floats:
         """Return the echo's phase by an error of one antenna position along an axis, rad/m.
 
-        Only ends that move along the aperture have a position anew for each echo.
+        Only ends that move along the aperture have a new position for each echo.
         """
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         target = np.stack([x, y, np.zeros(x.shape)], axis=-1)
@@ -598,16 +599,16 @@ class Sheet:
     def tolerated_scatter(self, axis: int, *, common: bool = False) -> float:
         """Return which white position errors keep 95 % of the heights within the tolerance, m.
 
-        Standard deviation along an axis, drawn anew at each position; over level ground
+        Standard deviation along an axis, independent by position; over level ground
         (`share_within`). Relief of more than the height of ambiguity makes errors that the channels
-        share as harmful as errors of each channel's own.
+        share as harmful as independent ones.
 
         Parameters
         ----------
         axis
             Axis of the errors.
         common
-            Whether both channels share them, as on a shaking vehicle, or have their own.
+            Whether both channels share them, as on a shaking vehicle, or have independent ones.
 
         Returns
         -------
@@ -633,8 +634,8 @@ class Sheet:
         """Return the coupling's strongest sidelobes in the image over the scene, dB.
 
         By the envelope of a rectangular window's sidelobes, ``1 / (N sin(pi r / R))`` for N
-        frequencies and the unambiguous range R; None where there is no coupling, or something is
-        done about it.
+        frequencies and the unambiguous range R; None where there is no coupling, or it is
+        suppressed.
         """
         level = self.study.echo.coupling_db
         if (
@@ -650,7 +651,7 @@ class Sheet:
         return level - 20 * math.log10(count * float(np.abs(np.sin(turn)).min()))
 
     def warnings(self) -> list[str]:
-        """Return what is unwise, a sentence each, in the order of the chain.
+        """Return what is questionable, a sentence each, in the order of the chain.
 
         The whole configuration is read (`validation.advice`).
         """

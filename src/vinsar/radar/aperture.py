@@ -1,4 +1,4 @@
-"""What an aperture images where, for any places and ways of transmitter and receiver.
+"""Where an aperture images a target, for any lines of transmitter and receiver.
 
 An aperture is two straight lines, ``T + a_T u`` of the transmitter and ``R + a_R u`` of the
 receiver, with u from -1/2 to 1/2: on a rail both are one, in a switched array the transmitter
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Coordinates closer than this are the same: a millionth of a cycle.
 _SAME_M = 1e-9
 
-# A departure of fewer standard errors is what scatter of the positions makes by itself.
+# Departures of fewer standard errors are due to the scatter of the positions.
 _SIGNIFICANT = 5.0
 
 _MOST_STEPS = 20
@@ -80,8 +80,8 @@ class Aperture:
 def fit(transmitter: Floats, receiver: Floats) -> Aperture:
     """Return the aperture of some antenna positions: straight lines by least squares.
 
-    What of a line's travel along an axis the positions' scatter around it explains counts as none:
-    positions with random errors turn no rail.
+    A travel along an axis within the standard error of the positions' scatter counts as none:
+    positions with random errors do not rotate a rail.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""The paper's formulas as it has them (Eqs. 2-6 and 12): plane waves, and prints to be compared.
+"""The paper's formulas as printed (Eqs. 2-6 and 12), most of them for plane waves.
 
-Nothing of the processing uses them. `vinsar.radar.instrument` derives the same quantities without
+The processing does not use them. `vinsar.radar.instrument` derives the same quantities without
 the plane wave, `vinsar.radar.geometry` and `vinsar.radar.aperture` what is imaged where.
 """
 
@@ -32,9 +32,10 @@ def printed_height(
     antenna_height: float,
     wavelength_m: float,
 ) -> Floats:
-    """Return the height by Eq. 3 as the paper prints it: wrong, kept to show by how much.
+    """Return the height by Eq. 3 as printed, which is wrong; kept to show by how much.
 
-    The numerator's ``lambda phi / 2 pi`` should be ``lambda phi / 4 pi``; use `invert_height`.
+    The numerator's ``lambda phi / 2 pi`` should be ``lambda phi / 4 pi``; use
+    `geometry.invert_height`.
 
     Parameters
     ----------

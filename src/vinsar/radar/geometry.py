@@ -71,7 +71,7 @@ def slant_range(position: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike = 
 def look_angle(position: ArrayLike, x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Floats:
     """Return the look angle from nadir (Eq. 9), in radians.
 
-    Eq. 9 has asin, which takes a target above the antenna for one below; atan2 does not.
+    The asin of Eq. 9 confuses a target above the antenna with one below; atan2 does not.
     """
     antenna = np.asarray(position, dtype=float)
     ground = np.hypot(np.asarray(x) - antenna[0], np.asarray(y) - antenna[1])

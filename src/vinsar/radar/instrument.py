@@ -1,10 +1,10 @@
-"""What a radar can do, from its antennas and its waveform alone: each quantity derived once.
+"""The performance of a radar from its antennas and waveform alone: each quantity derived once.
 
 Wavelength, resolution, ambiguities in range, width and height, and the critical baseline, for any
 arrangement of antennas. All of it follows from the two apertures (`vinsar.radar.aperture`): path
-and slope of the lower one and the difference of the paths locate a target, and the gradients of
-these three on the ground tell the rest. On the paper's rail they are its formulas without the
-plane wave (`vinsar.radar.formulas`).
+and slope of the lower one and the difference of the paths locate a target, and the rest follows
+from the gradients of these three on the ground. On the paper's rail the results are its formulas
+without the plane-wave approximation (`vinsar.radar.formulas`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.floating]
 
-# Lengths among which the critical baseline is looked for, in units of the baseline.
+# Lengths tried for the critical baseline, in units of the baseline.
 _FACTORS = np.geomspace(1e-3, 1e5, 161)
 _BISECTIONS = 50
 
@@ -263,7 +263,7 @@ class Instrument:
     def growth(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return by how much the lower path grows from one position to the next, in the mean, m.
 
-        Targets look alike when the growth of their paths differs by a wavelength (grating lobes).
+        Targets are ambiguous if the growth of their paths differs by a wavelength (grating lobes).
         """
         part = self.lower
         first, last = (
@@ -292,7 +292,7 @@ class Instrument:
         -------
         float
             Spacing along the aperture at which the growth of the paths to two of them differs by
-            the shortest wavelength; infinite for points that all look alike.
+            the shortest wavelength; infinite for points without a difference.
         """
         travel = max(
             float(np.linalg.norm(part))
@@ -305,7 +305,7 @@ class Instrument:
     def unambiguous_width(self, x: float, y: float) -> float:
         """Return the width around x that the spacing of the positions images once, m.
 
-        By the shortest wavelength; infinite if no two targets look alike.
+        By the shortest wavelength; infinite if no two targets are ambiguous.
         """
         from scipy.optimize import brentq
 

@@ -59,27 +59,27 @@ class Motion(Section, name="motion"):
     )
     cycles_per_aperture: float = key("periods of the vibration over the scan", "ours", gt=0)
     affects: Literal["recorded", "true"] = key(
-        "what errs: the positions that imaging is told, or the true ones while it is told the "
-        "undisturbed ones",
+        "which positions have the errors: those that focusing uses, or the true ones while it uses "
+        "the undisturbed ones",
         "section 2.4 has measurement errors",
     )
 
 
 class Vehicle(Section, name="vehicle"):
-    """The vehicle's way during the scan, and what imaging is told of it."""
+    """The vehicle's motion during the scan, and the speed that focusing assumes."""
 
     forward_speed_m_per_s: float = key(
         "constant speed ahead during the scan", "section 1, without a figure", ge=0, le=60
     )
     scan_duration_s: float = key(
-        "time of the cart along the rail, which only a moving vehicle feels; an array dwells on "
-        "each sample instead",
+        "time of the cart along the rail, relevant to a moving vehicle; an array dwells on each "
+        "sample instead",
         "section 1, without a figure",
         gt=0,
         le=60,
     )
     speed_correction: Literal["none", "exact", "sensor"] = key(
-        "the speed that imaging is told: zero, the true one, or that of the speed sensor",
+        "the speed that focusing assumes: zero, the true one, or that of the speed sensor",
         "section 1",
     )
     speed_error_m_per_s: float = key(
@@ -217,20 +217,20 @@ def advance(trajectory: xr.Dataset, *, speed_m_per_s: float, duration_s: float) 
 def imaged_place(
     x: ArrayLike, y: ArrayLike, *, true_slope: float, told_slope: float
 ) -> tuple[Floats, Floats]:
-    """Return where the image shows ground when imaging is told another speed.
+    """Return where ground is imaged when focusing assumes another speed.
 
     From the position ``(s, k s)`` on an aperture of the slope ``k`` a point has the squared range
     ``|p|^2 + (1 + k^2) s^2 - 2 s (x + k y)``. It is imaged where distance ``|p'|`` and
-    ``x' + k' y'`` of the slope ``k'`` that imaging is told are the same; what remains,
+    ``x' + k' y'`` of the slope ``k'`` that focusing assumes are the same; what remains,
     ``(k^2 - k'^2) s^2``, defocuses. Near broadside that is a turn by the error of the yaw angle.
-    The height is not touched: it comes from the difference of the two ranges alone.
+    The height is unaffected: it comes from the difference of the two ranges alone.
 
     Parameters
     ----------
     x, y
         Ground points relative to the aperture's centre, m, of shapes that broadcast.
     true_slope, told_slope
-        ``v / u`` of the true speed and of the one that imaging is told (`slope`).
+        ``v / u`` of the true speed and of the one that focusing assumes (`slope`).
 
     Returns
     -------
@@ -394,7 +394,7 @@ def _true_trajectory(products: Products, study: Study) -> xr.Dataset:
 
 
 def told_speed(study: Study) -> float:
-    """Return the speed that imaging is told, m/s."""
+    """Return the speed that focusing assumes, m/s."""
     options = study.vehicle
     if options.speed_correction == "none":
         return 0.0

@@ -145,7 +145,7 @@ def _refuse_unsound(folder: Path, study: Study) -> None:
 
 
 def _place(path: Path) -> str:
-    """Return where a file of the user's own lies in the crate: where the sources look for it."""
+    """Return where a file supplied by the user lies in the crate: where the sources look for it."""
     return f"{SOURCE}/own/{path.name}" if path.is_absolute() else f"{SOURCE}/{path.as_posix()}"
 
 
@@ -226,7 +226,7 @@ class _Description:
         self._folders()
         outputs = {record["file"]: self._output(record) for record in self.records}
         given = {
-            name: self._parameter(name, "File", "a file of the user's own", self.files[place])
+            name: self._parameter(name, "File", "a file supplied by the user", self.files[place])
             for name, place in self.own.items()
         }
         values = {job: self._values(job) for job in self.jobs}

@@ -78,7 +78,7 @@ def write_record(
         "job": job,
         "threads": threads,
         "inputs": {
-            # A file of the user's own lies elsewhere.
+            # A file supplied by the user lies elsewhere.
             name: Path(os.path.relpath(source, folder)).as_posix()
             for name, source in inputs.items()
         },
@@ -156,7 +156,7 @@ def _recorded(folder: Path) -> list[str]:
 
 
 def own_files(folder: str | Path, records: Records) -> dict[str, Path]:
-    """Return the files of the user's own that a study was made from.
+    """Return the user's files that a study was made from.
 
     Parameters
     ----------
@@ -413,7 +413,7 @@ def _own_changes(path: Path, digest: str, record: Mapping[str, Any]) -> Iterator
 
 
 def _own_file(path: Path, expected: str) -> Origin:
-    """Return a file of the user's own, whose origin nobody knows here."""
+    """Return a file supplied by the user, whose origin nobody knows here."""
     if not path.is_file():
         return Origin(path, {}, ["missing"])
     same = provenance.sha256(path) == expected

@@ -323,7 +323,7 @@ def add_coupling(
 
     Its path is that inside the radar and the distance from transmitter to receiver. At each
     position it has one complex amplitude for all frequencies, ``1 + e`` times its level, with a
-    circular normal ``e`` that is drawn anew at every position.
+    circular normal ``e`` that is independent by position.
 
     Parameters
     ----------

@@ -196,7 +196,7 @@ def from_heights(
                 f"its heights fall to {height.min():.3f} m above the ground plane, so that the "
                 f"reflectivity falls to {reflectivity.min():.3f}, being the height plus "
                 f"scene.reflectivity_offset; take an offset of {-height.min():.3f} or more, give "
-                "the file a 'reflectivity' of its own, or mend scene.ground_height_m"
+                "the file a 'reflectivity' of its own, or correct scene.ground_height_m"
             )
     return variables.dataset(
         "elevation", {"height": height, "reflectivity": reflectivity}, {"x": x, "y": y}

@@ -1,4 +1,4 @@
-"""Files of the user's own, surveyed heights and measured echoes, checked and made products.
+"""The user's files, surveyed heights and measured echoes, checked and made products.
 
 docs/own-data.md describes their form. Whatever is wrong with a file is one sentence that names it
 and says what to change.
@@ -233,14 +233,14 @@ def measurement(path: str) -> dict[str, xr.Dataset]:
 
 @contextmanager
 def _blaming(key: str, path: str) -> Iterator[None]:
-    """Say of whatever goes wrong which key and which file it comes from."""
+    """Name the key and the file in the message of any error."""
     try:
         yield
     except (OSError, RuntimeError, ValueError) as error:
         sentence = str(error)
         if not isinstance(error, ValueError):
             why = sentence.partition("\n")[0]
-            sentence = f"is truncated or of another format ({why}); write or copy it anew"
+            sentence = f"is truncated or of another format ({why}); write or copy it again"
         raise ConfigurationError([Fault(key, path, sentence)]) from error
 
 

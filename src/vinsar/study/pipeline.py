@@ -29,7 +29,7 @@ MEASURED = ("received", "trajectory", "recorded_trajectory")
 
 
 def from_files(study: Study) -> tuple[str, ...]:
-    """Return the products that a study takes from files of the user's own."""
+    """Return the products that a study takes from the user's files."""
     if study.measurement.file is not None:
         return MEASURED
     return ("elevation",) if study.scene.terrain == "file" else ()
@@ -117,7 +117,7 @@ def run(
     only
         A product: compute no more than it needs.
     given
-        Products that are there already, such as those from files of the user's own
+        Products that are there already, such as those from the user's files
         (`ingest.read`); they are not computed.
 
     Returns

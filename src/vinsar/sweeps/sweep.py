@@ -273,7 +273,7 @@ def _refuse_idle(study: Study, name: str) -> None:
         count = Counter(_text(_number_by_value(value)) for value in values)
         twice = [text for text, times in count.items() if times > 1]
         if twice:
-            faults.append(Fault(where, ", ".join(twice), "stands there more than once"))
+            faults.append(Fault(where, ", ".join(twice), "is listed more than once"))
     if faults:
         raise ConfigurationError(faults)
 
@@ -530,7 +530,7 @@ def run(
     progress
         Called with the number of finished cases and of all.
     given
-        Products from files of the user's own, which all cases share.
+        Products from the user's files, which all cases share.
 
     Returns
     -------

@@ -23,7 +23,7 @@ def evaluate(study: Study, given: Mapping[str, xr.Dataset] | None = None) -> dic
     study
         The configuration, with its `variants`.
     given
-        Products from files of the user's own, the same for all.
+        Products from the user's files, the same for all.
 
     Returns
     -------
