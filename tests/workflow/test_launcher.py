@@ -334,6 +334,38 @@ def test_old_python_needs_no_successor_once_set_up(lasting, tmp_path):
     assert done.stderr == ""
 
 
+LOCK_WITH_UV = "six==2\nuv==1 \\\n    --hash=sha256:0\nzipp==3\n"
+
+UV = """\
+from stand_in import *
+note("uv " + " ".join(sys.argv[1:]))
+"""
+
+
+def test_uv_installs_the_lock_that_names_it(ready):
+    (site_packages,) = ready.venv.glob("lib/python*/site-packages")
+    (site_packages / "uv.py").write_text(UV)
+    ready.lock.write_text(LOCK_WITH_UV)
+    assert ready.run().returncode == 0
+    wheel, uv = (line for line in ready.notes if line.startswith(("pip ", "uv ")))
+    (wanted,) = ready.venv.glob("uv-requirements.txt")
+    assert wanted.read_text() == "uv==1 \\\n    --hash=sha256:0\n"
+    assert wheel.endswith(f"--no-deps --require-hashes -r {wanted}")
+    assert uv.startswith("uv pip install")
+    assert uv.endswith(f"--no-deps --require-hashes -r {ready.lock}")
+
+
+@pytest.mark.parametrize(
+    ("config", "steps"), [("", 2), ("global.index-url='https://packages.example'", 1)]
+)
+def test_pip_installs_what_uv_cannot_or_may_not(ready, config, steps):
+    ready.lock.write_text(LOCK_WITH_UV)
+    assert ready.run(CONFIG_OF_PIP=config).returncode == 0
+    assert ready.steps == ["pip"] * steps
+    *_, last = (line for line in ready.notes if line.startswith("pip "))
+    assert last.endswith(f"--no-deps --require-hashes -r {ready.lock}")
+
+
 def test_changed_lock_is_installed_into_the_same_environment(ready):
     kept = ready.venv / "kept"
     kept.touch()
