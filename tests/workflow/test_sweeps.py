@@ -171,21 +171,32 @@ SOLVERS = SWEEP.replace("filtering.goldstein_alpha", "unwrapping.method").replac
 
 @pytest.mark.skipif(importlib.util.find_spec("snaphu") is not None, reason="snaphu is installed")
 def test_failed_cases_are_named_and_only_they_are_computed_after_mending(fresh, tmp_path):
+    solver = tmp_path / "snaphu.py"
+    path = f"{fresh.folder / 'src'}{os.pathsep}{tmp_path}"
     fresh.set(SOLVERS.replace("processes", "threads"))
-    code, said = fresh.run()
+    solver.write_text("def unwrap(*_, **__):\n    raise ValueError('no licence')\n")
+    code, said = fresh.run(PYTHONPATH=path)
     assert code == 1
     assert "40 of 80 cases of the sweep 'quick' failed" in said
     assert "level_wavelengths = 0.1, unwrapping.method = snaphu, realization 0: ValueError" in said
     assert "Traceback (" not in said
     assert not fresh.output.exists()
-    # Mended: there is a solver of that name now.
-    (tmp_path / "snaphu.py").write_text(
+    # Mended.
+    solver.write_text(
         "import numpy\ndef unwrap(values, *_, **__):\n    return numpy.angle(values), None\n"
     )
-    path = f"{fresh.folder / 'src'}{os.pathsep}{tmp_path}"
     code, said = fresh.run(PYTHONPATH=path)
     assert code == 0, said
     assert finished_before(fresh.log()) == 40
+
+
+@pytest.mark.skipif(importlib.util.find_spec("snaphu") is not None, reason="snaphu is installed")
+def test_a_solver_that_is_not_installed_starts_nothing(fresh):
+    fresh.set(SOLVERS)
+    code, said = fresh.run()
+    assert code == 1
+    assert "unwrapping.method = 'snaphu': snaphu is not installed" in said
+    assert not (fresh.folder / "results").exists()
 
 
 def test_a_wrong_sweep_starts_nothing(fresh):
