@@ -198,7 +198,8 @@ def find_unsound(workflow):
     folder = results.folder(study.study)
     made = {Path(path) for job in jobs for path in job.output}
     names = [path.relative_to(folder).as_posix() for path in made if path.is_relative_to(folder)]
-    return lineage.unsound(folder, study, names)
+    found = lineage.unsound(folder, study, names)
+    return {(folder / name).as_posix(): problems for name, problems in found.items()}
 
 
 def make_again(arguments, unsound):
@@ -210,8 +211,7 @@ def make_again(arguments, unsound):
         fail(f"these results do not hold though they were made {number} times")
     say("they are made again")
     os.environ[ROUND] = str(number + 1)
-    files = [str(path) for path in unsound]
-    command = [sys.executable, "-P", __file__, "--forcerun", *files, "--rerun-incomplete"]
+    command = [sys.executable, "-P", __file__, "--forcerun", *unsound, "--rerun-incomplete"]
     os.execv(sys.executable, [*command, *arguments])  # noqa: S606
 
 

@@ -155,7 +155,7 @@ def test_what_does_not_hold_is_made_again_and_named(copy):
         done = copy.snakemake(*arguments, "accuracy_summary", "focus")
         assert done.returncode == 0, done.stderr
         for name in ("dem.nc", "focus.nc"):
-            assert f"vinsar: {name} does not hold: modified by hand" in done.stderr, done.stderr
+            assert f"vinsar: results/tiny/{name} does not hold: modified by hand" in done.stderr, done.stderr
     assert {name: (results / name).read_bytes() for name in names} == before
 
 
@@ -167,7 +167,7 @@ def test_an_intermediate_that_nothing_asks_for_is_missed(copy):
     # Not even where the target is a figure that is there.
     done = copy.snakemake("figure_snr")
     assert done.returncode == 0, done.stderr
-    assert "vinsar: sweeps/snr.nc does not hold: missing" in done.stderr
+    assert "vinsar: results/tiny/sweeps/snr.nc does not hold: missing" in done.stderr
     assert lost.read_bytes() == before
 
 
