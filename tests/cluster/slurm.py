@@ -8,14 +8,15 @@ import socket
 import subprocess
 import time
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "sinfo")
 SECONDS = 120
+USUAL = Path("/etc/slurm/slurm.conf")
 
 CONFIGURATION = """\
 ClusterName=one
@@ -47,6 +48,8 @@ PartitionName=short Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 def lacking() -> list[str]:
     """Return the programs that are not installed, and who may start them."""
     missing = [name for name in PROGRAMS if shutil.which(name) is None]
+    if USUAL.exists() and not USUAL.is_symlink():
+        missing.append(f"a machine without {USUAL}")
     return missing if os.geteuid() == 0 else [*missing, "root"]
 
 
@@ -82,6 +85,11 @@ def running(folder: Path, cpus: int) -> Iterator[dict[str, str]]:
         f"--log-file={folder}/munge/log", f"--seed-file={folder}/munge/seed",
     ]  # fmt: skip
     daemons = []
+    # A job's own steps ask where every SLURM is found, without this environment.
+    USUAL.parent.mkdir(exist_ok=True)
+    if USUAL.is_symlink():
+        USUAL.unlink()
+    USUAL.symlink_to(folder / "slurm.conf")
     try:
         for command in (munged, ["slurmctld", "-D"], ["slurmd", "-D"]):
             with (folder / f"{command[0]}.out").open("wb") as out:
@@ -91,6 +99,7 @@ def running(folder: Path, cpus: int) -> Iterator[dict[str, str]]:
         _wait(lambda: _idle(environment), daemons, folder)
         yield environment
     finally:
+        USUAL.unlink()
         subprocess.run(
             ["scancel", "--user=root", "--state=PENDING,RUNNING"],
             env=environment, check=False, capture_output=True,

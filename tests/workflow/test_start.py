@@ -155,7 +155,8 @@ def test_what_does_not_hold_is_made_again_and_named(copy):
         done = copy.snakemake(*arguments, "accuracy_summary", "focus")
         assert done.returncode == 0, done.stderr
         for name in ("dem.nc", "focus.nc"):
-            assert f"vinsar: results/tiny/{name} does not hold: modified by hand" in done.stderr, done.stderr
+            told = f"vinsar: results/tiny/{name} does not hold: modified by hand"
+            assert told in done.stderr, done.stderr
     assert {name: (results / name).read_bytes() for name in names} == before
 
 
