@@ -294,7 +294,7 @@ def test_a_stage_that_failed_is_computed_again(tiny, memo, monkeypatch):
         ({"radar.baseline_m": [0.3, 0.2, 0.3]}, "over.radar.baseline_m = '0.3': is listed"),
         ({"motion.level_wavelengths": [1, 1.0]}, "is listed more than once"),
         ({"motion": [{"axis": "q"}]}, "motion.axis = 'q'"),
-        ({"motion.level_wavelengths": [0.0, -0.0]}, "stands there more than once"),
+        ({"motion.level_wavelengths": [0.0, -0.0]}, "is listed more than once"),
         ({"motion": [{"level_wavelengths": 0}, {"level_wavelengths": -0.0}]}, "more than once"),
         ({"motion.axis": ["x"], "motion": [{"axis": "z"}]}, "motion.axis: is within motion"),
         ({"motion": [{"axis": "z"}], "motion.axis": ["x"]}, "motion.axis: is within motion"),
