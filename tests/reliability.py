@@ -75,11 +75,11 @@ KINDS = {
          f"{WORKFLOW}/test_start.py::test_targets_may_stand_behind_a_configuration"],
     ),
 }  # fmt: skip
-BEYOND = (
-    "Beyond these, `tests/workflow` spoils finished studies (edited products and records, lost "
-    "intermediates, code that changes while a job runs) and runs in folders of odd names; "
-    "`tests/cluster` runs a study and a sweep on a SLURM of one node."
-)
+BEYOND = """\
+Beyond these, `tests/workflow` spoils finished studies (edited products and records, lost intermediates, code that
+changes while a job runs) and runs in folders of odd names; `tests/cluster` runs a study and a sweep on a SLURM of one
+node.
+"""  # noqa: E501
 
 
 def main() -> int:
@@ -95,9 +95,9 @@ def main() -> int:
     lines = [
         "# Reliability",
         "",
-        "What may go wrong, tried. `.venv/bin/python tests/reliability.py > docs/reliability.md`",
-        "runs the tests and prints this page; a case is a test, and one with `hypothesis` tries 60",
-        "examples.",
+        "What may go wrong, tried. `.venv/bin/python tests/reliability.py > docs/reliability.md` runs"
+        " the tests and prints",
+        "this page; a case is a test, and one with `hypothesis` tries 60 examples.",
         "",
         "| kind | what is to happen | cases | as it is to be |",
         "|---|---|---:|---:|",
@@ -107,7 +107,7 @@ def main() -> int:
         tried = [case for case in mine if case.find("skipped") is None]
         good = [c for c in tried if c.find("failure") is None and c.find("error") is None]
         lines.append(f"| {kind} | {expected} | {len(tried)} | {len(good)} |")
-    sys.stdout.write("\n".join([*lines, "", BEYOND, ""]))
+    sys.stdout.write("\n".join([*lines, "", BEYOND]))
     return done.returncode
 
 
