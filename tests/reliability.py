@@ -95,8 +95,8 @@ def main() -> int:
     lines = [
         "# Reliability",
         "",
-        "What may go wrong, tried. `.venv/bin/python tests/reliability.py > docs/reliability.md` runs"
-        " the tests and prints",
+        "What may go wrong, tried. `.venv/bin/python tests/reliability.py > docs/reliability.md` "
+        "runs the tests and prints",
         "this page; a case is a test, and one with `hypothesis` tries 60 examples.",
         "",
         "| kind | what is to happen | cases | as it is to be |",
