@@ -38,14 +38,14 @@ def peer(name):
         return None
 
 
-def matched_filter(signal, frequency, antennas, x, y):
+def matched_filter(signal, frequency, antennas, x, y, z):
     """Return the direct float64 sum over positions and frequencies at each pixel."""
     grid_x, grid_y = np.meshgrid(x, y)
     result = np.zeros(grid_x.shape, complex)
     step = frequency[1] - frequency[0]
     for samples, antenna in zip(signal, antennas, strict=True):
         path = 2 * np.sqrt(
-            (grid_x - antenna[0]) ** 2 + (grid_y - antenna[1]) ** 2 + antenna[2] ** 2
+            (grid_x - antenna[0]) ** 2 + (grid_y - antenna[1]) ** 2 + (z - antenna[2]) ** 2
         )
         # Horner's scheme in exp(2 pi i step R / c): one exponential for all frequencies.
         turn = np.exp(2j * np.pi * step / LIGHT * path)

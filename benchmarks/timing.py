@@ -5,26 +5,29 @@ from __future__ import annotations
 import os
 import platform
 import time
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 
 
-def interleaved(contenders, rounds, clock=time.process_time):
-    """Return each contender's seconds, round by round.
+def interleaved(contenders, rounds):
+    """Return each contender's seconds, round by round, of the process and by the wall clock.
 
-    They take turns, so that what else the machine does meets them alike. The clock counts the
-    process's own time on a core, of which all contenders use one.
+    They take turns, so that what else the machine does meets them alike. The process's own time
+    counts on one core, of which all contenders use one; beside other work it is the shorter one.
     """
     for run in contenders.values():
         run()
-    taken = {name: [] for name in contenders}
+    clocks = time.process_time, time.perf_counter
+    taken = tuple({name: [] for name in contenders} for _ in clocks)
     for _ in range(rounds):
         for name, run in contenders.items():
-            begin = clock()
+            begin = [clock() for clock in clocks]
             run()
-            taken[name].append(clock() - begin)
+            for seconds, clock, start in zip(taken, clocks, begin, strict=True):
+                seconds[name].append(clock() - start)
     return taken
 
 
@@ -45,11 +48,12 @@ def machine():
     from llvmlite import binding
 
     features = binding.get_host_cpu_features()
-    names = ("numpy", "scipy", "numba", "llvmlite", "finufft", "dask", "xarray", "whirlwind-insar")
+    names = ("numpy", "scipy", "numba", "llvmlite", "dask", "xarray", "whirlwind-insar")
     return {
+        "date": datetime.now(tz=UTC).date().isoformat(),
         "processor": model,
         "microarchitecture": binding.get_host_cpu_name(),
-        "avx512": bool(features.get("avx512f")),
+        "avx512": bool(features.get("avx512f")) and "NUMBA_CPU_FEATURES" not in os.environ,
         "cores": len(os.sched_getaffinity(0)),
         "load": os.getloadavg()[0],
         "python": platform.python_version(),
