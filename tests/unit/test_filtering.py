@@ -153,7 +153,7 @@ def test_boxcar_refuses_an_even_window(window):
         filtering.boxcar(np.ones((5, 5)), window_px=window)
 
 
-@pytest.mark.parametrize("method", ["goldstein", "boxcar", "none"])
+@pytest.mark.parametrize("method", ["goldstein", "boxcar", "gaussian", "none"])
 def test_apply_takes_the_filter_by_name(method):
     values = speckle(5, (20, 24)).astype(np.complex64)
     data = variables.dataset(
@@ -163,11 +163,12 @@ def test_apply_takes_the_filter_by_name(method):
     )
     found = filtering.apply(
         data, method=method, goldstein_alpha=0.5, goldstein_patch_px=8, goldstein_step_px=4,
-        boxcar_window_px=3,
+        boxcar_window_px=3, gaussian_std_px=1.5,
     )  # fmt: skip
     expected = {
         "goldstein": lambda: filtering.goldstein(values, alpha=0.5, patch_px=8, step_px=4),
         "boxcar": lambda: filtering.boxcar(values, window_px=3),
+        "gaussian": lambda: filtering.gaussian(values, std_px=1.5),
         "none": lambda: values,
     }[method]()
     np.testing.assert_array_equal(found["interferogram"].values, expected)
@@ -221,6 +222,7 @@ def speckled_pair(cell_px, coherence, side=224, seed=0):
         {"method": "none"},
         {"method": "boxcar"},
         {"method": "boxcar", "boxcar_window_px": 15},
+        {"method": "gaussian"},
         {},
         {"goldstein_alpha": 0.5},
         {"goldstein_patch_px": 32},
@@ -233,6 +235,7 @@ def test_the_filter_s_looks_give_the_phase_noise_of_filtered_speckle(changes, ce
         "goldstein_patch_px": 64,
         "goldstein_step_px": 8,
         "boxcar_window_px": 5,
+        "gaussian_std_px": 4.0,
     } | changes
     lower, upper = speckled_pair(cell_px, coherence)
     product = variables.dataset(
@@ -278,7 +281,12 @@ def test_the_baseline_s_share_of_the_noise():
 
 @pytest.mark.parametrize("method", filtering.FILTERS)
 def test_every_filter_has_its_looks(method):
-    options = {"goldstein_alpha": 0.8, "goldstein_patch_px": 32, "boxcar_window_px": 5}
+    options = {
+        "goldstein_alpha": 0.8,
+        "goldstein_patch_px": 32,
+        "boxcar_window_px": 5,
+        "gaussian_std_px": 2.0,
+    }
     assert filtering.effective_looks(0.9, (2.0, 4.0), method=method, **options) >= 1
 
 

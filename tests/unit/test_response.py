@@ -28,7 +28,13 @@ def of(values, method, **options):
     return response.of(
         values,
         method=method,
-        **{"goldstein_alpha": 0.8, "goldstein_patch_px": 16, "boxcar_window_px": 5} | options,
+        **{
+            "goldstein_alpha": 0.8,
+            "goldstein_patch_px": 16,
+            "boxcar_window_px": 5,
+            "gaussian_std_px": 1.5,
+        }
+        | options,
     )
 
 

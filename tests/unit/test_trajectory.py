@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vinsar.foundations import constants
 from vinsar.radar import trajectory
 from vinsar.study import validation
 
@@ -122,3 +124,27 @@ def test_range_extent_encloses_every_range_and_no_more(rail, left, right, near, 
     assert distance.max() == pytest.approx(most, rel=1e-12)
     assert least <= distance.min() + 1e-12
     assert distance.min() <= least + half_step + 0.04
+
+
+@pytest.mark.parametrize("system", ["rail", "transmit_pair", "receive_pair"])
+def test_further_antennas_stand_between_the_lower_and_the_upper_one(system):
+    section = validation.load(Path(__file__).parents[2] / "config/paper.yaml").radar.model_copy(
+        update={"system": system}
+    )
+    two = trajectory.planned(section)
+    three = trajectory.planned(section.model_copy(update={"baselines_m": (0.06, 0.3)}))
+    assert list(three["channel"].values) == ["lower", "middle", "upper"]
+    xr.testing.assert_identical(three.sel(channel=["lower", "upper"]), two)
+    step = three.sel(channel="middle") - three.sel(channel="lower")
+    whole = three.sel(channel="upper") - three.sel(channel="lower")
+    for end in ("transmitter", "receiver"):
+        np.testing.assert_allclose(step[end], whole[end] / 5, atol=1e-12)
+    pair, every = trajectory.apertures(three), trajectory.all_apertures(three)
+    assert len(every) == 3
+    np.testing.assert_array_equal(pair[1].center, every[2].center)
+
+
+def test_channels_are_named_from_the_lowest_to_the_highest():
+    assert constants.channel_names(1) == ("lower",)
+    assert constants.channel_names(2) == ("lower", "upper")
+    assert constants.channel_names(4) == ("lower", "middle 1", "middle 2", "upper")

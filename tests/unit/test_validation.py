@@ -89,6 +89,21 @@ SWEEP = {"over": {"echo.snr_db": [1.0]}, "realizations": 1, "base": {}}
         ({"figures__formats": ["pdf"]}, "figures.formats", "must hold png"),
         ({"figures__formats": ["png", "png"]}, "figures.formats", "each format once"),
         ({"figures__formats": ["jpg"]}, "figures.formats[0]", "'pdf', 'svg' or 'png'"),
+        (
+            {"radar__baselines_m": [0.3, 0.06]},
+            "radar.baselines_m",
+            "must rise from above 0, no two of them equal",
+        ),
+        ({"radar__baselines_m": [0.3, 0.3]}, "radar.baselines_m", "no two of them equal"),
+        ({"radar__baselines_m": [-0.1, 0.3]}, "radar.baselines_m", "must rise from above 0"),
+        ({"radar__baselines_m": []}, "radar.baselines_m", "at least 1"),
+        ({"radar__baselines_m": [0.06, 0.2]}, "radar.baselines_m", "end with radar.baseline_m"),
+        ({"unwrapping__method": "baselines"}, "unwrapping.method", "two baselines or more"),
+        (
+            {"radar__baselines_m": [0.3 * n / 1e5 for n in range(1, 100_001)]},
+            "radar.baselines_m",
+            "take fewer antennas",
+        ),
         ({"seed": -1}, "seed", "greater than or equal to 0"),
         *(
             ({section: {name: content} if content is not None else name}, key, "1 to 80 letters")
@@ -277,6 +292,10 @@ def test_the_advised_frequency_count_suffices():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
+        (
+            {"radar__baselines_m": [0.004, 0.3]},
+            "shorter than a quarter of the wavelength, 0.0054 m",
+        ),
         ({"radar__baseline_m": 2.5}, "quarter of the critical baseline, 1.050 m"),
         ({"scene__facet_size_m": 0.02}, "below the wavelength, 0.0214 m"),
         ({"imaging__y_max_m": 17.0}, "beyond the scene"),

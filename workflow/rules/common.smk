@@ -52,6 +52,10 @@ def stage_configuration(name):
 
 
 def refuse_without_truth(name, wildcards):
+    if STUDY.measurement.file is None:
+        raise WorkflowError(
+            f"The options of the study '{STUDY.study}' ask for no '{name}'."
+        )
     raise WorkflowError(
         f"There is no '{name}' in the study '{STUDY.study}': its echoes are measured "
         "(measurement.file), and what needs the true scene is left out."
@@ -80,7 +84,8 @@ def own_heights():
 
 def stage_inputs(name):
     stage = composition.STAGES[name]
-    given = [other for other in stage.optional if other in pipeline.from_files(STUDY)]
+    there = {*STAGES, *pipeline.from_files(STUDY)}
+    given = [other for other in stage.optional if other in there]
     return product_files(*stage.inputs, *given)
 
 

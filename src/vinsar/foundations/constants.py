@@ -10,6 +10,13 @@ SPEED_OF_LIGHT: Final = 299_792_458.0
 CHANNELS: Final = ("lower", "upper")
 """The two interferometric channels: S1 is the lower antenna, S2 the upper one."""
 
+
+def channel_names(count: int) -> tuple[str, ...]:
+    """Return the names of channels above each other, the lowest and the highest at the ends."""
+    between = ["middle"] if count == 3 else [f"middle {n}" for n in range(1, count - 1)]
+    return (CHANNELS[0], *between, CHANNELS[1]) if count > 1 else CHANNELS[:count]
+
+
 AXES: Final = ("x", "y", "z")
 """Right-handed axes in metres: x along the rail, y forward, z up."""
 

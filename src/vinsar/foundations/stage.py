@@ -35,6 +35,8 @@ class Stage:
         Products that it reads if the study has them.
     parallel
         Whether it keeps more than one core busy.
+    when
+        Whether a study has it; without, every study does.
     """
 
     compute: Callable[[Products, Study], xr.Dataset]
@@ -43,6 +45,7 @@ class Stage:
     by_channel: bool = False
     optional: tuple[str, ...] = ()
     parallel: bool = False
+    when: Callable[[Study], bool] | None = None
 
     @property
     def module(self) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import xarray as xr
 
-from vinsar.foundations.constants import AXES, CHANNELS
+from vinsar.foundations.constants import AXES, channel_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -140,7 +140,7 @@ def declare(
         _CHECKS[product] = check
 
 
-LABELS: dict[str, tuple[str, ...]] = {"channel": CHANNELS, "axis": AXES, "ground_axis": AXES[:2]}
+LABELS: dict[str, tuple[str, ...]] = {"axis": AXES, "ground_axis": AXES[:2]}
 
 
 def dataset(
@@ -188,7 +188,7 @@ def dataset(
         if coords is not None and name in coords:
             values = np.asarray(coords[name])
         else:
-            values = np.asarray(LABELS[name] if name in LABELS else np.arange(sizes[name]))
+            values = _labels(name, sizes[name])
         labels[name] = _coordinate(name, values)
     result = xr.Dataset(
         contents,
@@ -200,6 +200,12 @@ def dataset(
     )
     check(result, product)
     return result
+
+
+def _labels(name: str, size: int) -> NDArray[Any]:
+    if name == "channel":
+        return np.asarray(channel_names(size))
+    return np.asarray(LABELS[name]) if name in LABELS else np.arange(size)
 
 
 def _coordinate(name: str, values: NDArray[Any]) -> _Coordinate:

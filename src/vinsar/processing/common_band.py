@@ -23,13 +23,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.foundations import blocks
+from vinsar.foundations import blocks, variables
 from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.foundations.stage import Stage
+from vinsar.foundations.variables import GRID, Variable
+from vinsar.processing import filtering, height, interferogram, leakage
 from vinsar.radar import aperture, trajectory, waveform
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
     from numpy.typing import NDArray
+
+    from vinsar.foundations.configuration import Study
+    from vinsar.foundations.stage import Products
 
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
@@ -55,6 +63,35 @@ _MOST_STEPS = 20
 _CONVERGED_M = 1e-7
 
 _ROWS_PER_BLOCK, _POSITIONS_PER_BLOCK = 16, 48
+
+variables.declare(
+    "refined",
+    {
+        "phase": Variable(
+            GRID,
+            "real",
+            "radian",
+            "interferometric phase by the second pass, without the flat-earth phase",
+            "lower minus upper; unwrapped, known up to one constant",
+        ),
+        "image": Variable(
+            ("channel", "y", "x"),
+            "complex",
+            "1",
+            "complex image focused on the surface",
+            "the upper one turned by the surface's phase, as if it were focused on the plane",
+        ),
+        "interferogram": Variable(GRID, "complex", "1", "interferogram of these"),
+        "filtered": Variable(GRID, "complex", "1", "filtered interferogram of these"),
+        "coherence": Variable(GRID, "real", "1", "multilooked coherence magnitude of these"),
+        "surface": Variable(
+            GRID, "real", "m", "height of the surface that the image's pixel is focused on"
+        ),
+        "shared": Variable(
+            GRID, "real", "1", "share of band times aperture that both channels have in common"
+        ),
+    },
+)
 
 
 @dataclass(frozen=True)
@@ -89,7 +126,7 @@ class Support:
         return np.asarray(width[self.kind] * np.maximum(self.last - self.first, 0)[0] / positions)
 
 
-def surface(height: Floats, power: Floats, *, std_px: float) -> Floats:
+def surface(height: Floats, power: Floats, *, std_px: float | Sequence[float]) -> Floats:
     """Return heights smoothed by a Gaussian, weighted with the image's power.
 
     Parameters
@@ -99,7 +136,7 @@ def surface(height: Floats, power: Floats, *, std_px: float) -> Floats:
     power
         The pixels' power (y, x); what exceeds three medians counts as that.
     std_px
-        Standard deviation of the Gaussian, pixels.
+        Standard deviation of the Gaussian, pixels; of two, in y and x.
 
     Returns
     -------
@@ -305,3 +342,79 @@ def _transform(frequency: Floats, near: float, far: float) -> tuple[Floats, floa
     circle = np.stack([np.cos(angle), np.sin(angle)]).astype(np.float32)
     transform = np.stack([part[turns] for part in circle])
     return transform, spacing * first, spacing, np.sinc(offset / length) ** 4
+
+
+def _refined(products: Products, study: Study) -> xr.Dataset:
+    images, unwrapped = products["images"], products["unwrapped"]
+    x, y = images["x"].values, images["y"].values
+    ends = [0, -1]
+    echo = leakage.suppress(products["received"], **study.suppression.model_dump())
+    echo = echo.isel(channel=ends)
+    frequency = echo["frequency"].values
+    channels = trajectory.apertures(images)
+    wavelength = float(images["wavelength"])
+    points = height.reference(x, y, study.height)
+    offset = height.phase_offset(unwrapped, images, points, trend=study.height.trend)
+    first = height.invert(unwrapped, images, offset)
+    found = surface(
+        first.image_height,
+        np.abs(images["image"].values[0]) ** 2,
+        std_px=[study.imaging.surface_std_m / (axis[1] - axis[0]) for axis in (y, x)],
+    )
+    point = place(channels[0], x, y, found)
+    positions = echo.sizes["position"]
+    common = support((channels[0], channels[1]), point, frequency, positions)
+    lower, upper = focus(
+        echo,
+        images.isel(channel=ends),
+        point,
+        common,
+        range_window=study.imaging.range_window,
+        aperture_window=study.imaging.aperture_window,
+    )
+    # What is left after the surface's phase and the channels' own constant does not wrap.
+    constant = np.exp(1j * offset).astype(np.complex64)
+    filtered = filtering.smooth(lower * np.conj(upper) * constant, **study.filtering.model_dump())
+    rest = np.angle(filtered) * waveform.carrier(frequency) / common.centers[1]
+    flat = aperture.flat_earth_phase(channels[0], channels[1], x[None, :], y[:, None], wavelength)
+    known = (
+        aperture.interferometric_phase(
+            channels[0], channels[1], point[0], point[1], point[2], wavelength
+        )
+        - flat
+    )
+    turn = np.exp(1j * known).astype(np.complex64)
+    return variables.dataset(
+        "refined",
+        {
+            "phase": known + rest - offset,
+            "image": np.stack([lower, upper / turn]),
+            "interferogram": lower * np.conj(upper) * turn,
+            "filtered": filtered / constant * turn,
+            "coherence": interferogram.coherence(
+                lower, upper, study.interferogram.coherence_window_px
+            ),
+            "surface": found,
+            "shared": common.share(frequency, positions),
+        },
+        {"x": x, "y": y},
+    )
+
+
+STAGES = {
+    "refined": Stage(
+        _refined,
+        inputs=("received", "images", "unwrapped"),
+        sections=(
+            "suppression",
+            "imaging.range_window",
+            "imaging.aperture_window",
+            "imaging.surface_std_m",
+            "interferogram",
+            "filtering",
+            "height",
+        ),
+        parallel=True,
+        when=lambda study: study.imaging.surface == "estimated",
+    ),
+}

@@ -203,6 +203,10 @@ def _boxcar(values: Complexes, *, boxcar_window_px: int, **_: Any) -> Complexes:
     return boxcar(values, window_px=boxcar_window_px)
 
 
+def _gaussian(values: Complexes, *, gaussian_std_px: float, **_: Any) -> Complexes:
+    return gaussian(values, std_px=gaussian_std_px)
+
+
 def _none(values: Complexes, **_: Any) -> Complexes:
     return values
 
@@ -210,6 +214,7 @@ def _none(values: Complexes, **_: Any) -> Complexes:
 FILTERS: dict[str, Callable[..., Complexes]] = {
     "goldstein": _goldstein,
     "boxcar": _boxcar,
+    "gaussian": _gaussian,
     "none": _none,
 }
 """The filters by name; each takes the interferogram and, by keyword, the keys of `Filtering`."""
@@ -227,15 +232,20 @@ class Filtering(Section, name="filtering"):
     goldstein_patch_px: int = key("side of a patch", "reference 19", ge=4)
     goldstein_step_px: int = key("step between patches", "reference 19", ge=1)
     boxcar_window_px: int = key("side of the boxcar, odd", "not mentioned", ge=1)
+    gaussian_std_px: float = key(
+        "standard deviation of the Gaussian; it averages 4 pi times its square",
+        "not mentioned",
+        gt=0,
+    )
 
 
-def apply(interferogram: xr.Dataset, *, method: str, **options: Any) -> xr.Dataset:
+def smooth(interferogram: Complexes, *, method: str, **options: Any) -> Complexes:
     """Filter an interferogram with the chosen filter.
 
     Parameters
     ----------
     interferogram
-        Product ``interferogram``.
+        Complex interferogram (y, x).
     method
         A key of `FILTERS`; ``none`` passes the interferogram on.
     options
@@ -243,8 +253,8 @@ def apply(interferogram: xr.Dataset, *, method: str, **options: Any) -> xr.Datas
 
     Returns
     -------
-    xarray.Dataset
-        Product ``filtered``.
+    ndarray, shape (y, x)
+        Filtered interferogram.
 
     Raises
     ------
@@ -253,9 +263,27 @@ def apply(interferogram: xr.Dataset, *, method: str, **options: Any) -> xr.Datas
     """
     if method not in FILTERS:
         raise ValueError(f"no filter '{method}'; there are {', '.join(FILTERS)}")
+    return FILTERS[method](interferogram, **options)
+
+
+def apply(interferogram: xr.Dataset, **options: Any) -> xr.Dataset:
+    """Filter an interferogram with the chosen filter.
+
+    Parameters
+    ----------
+    interferogram
+        Product ``interferogram``.
+    options
+        As in `smooth`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``filtered``.
+    """
     return variables.dataset(
         "filtered",
-        {"interferogram": FILTERS[method](interferogram["interferogram"].values, **options)},
+        {"interferogram": smooth(interferogram["interferogram"].values, **options)},
         {"x": interferogram["x"].values, "y": interferogram["y"].values},
     )
 
@@ -384,9 +412,21 @@ def _goldstein_noise(
 def _boxcar_noise(
     gamma: Floats, spectra: Callable[[int], Spectra], *, boxcar_window_px: int, **_: Any
 ) -> tuple[Floats, Floats]:
-    mean = np.zeros(_BINS)
-    mean[:boxcar_window_px] = 1 / boxcar_window_px
-    gain = np.abs(np.fft.fft(mean)) ** 2
+    return _average_noise(np.full(boxcar_window_px, 1 / boxcar_window_px), gamma, spectra)
+
+
+def _gaussian_noise(
+    gamma: Floats, spectra: Callable[[int], Spectra], *, gaussian_std_px: float, **_: Any
+) -> tuple[Floats, Floats]:
+    reach = np.arange(-int(4 * gaussian_std_px), int(4 * gaussian_std_px) + 1)
+    weights = np.exp(-0.5 * (reach / gaussian_std_px) ** 2)
+    return _average_noise(weights / weights.sum(), gamma, spectra)
+
+
+def _average_noise(
+    weights: Floats, gamma: Floats, spectra: Callable[[int], Spectra]
+) -> tuple[Floats, Floats]:
+    gain = np.abs(np.fft.fft(weights, _BINS)) ** 2
     down, even, across = (float(axis @ gain) for axis in spectra(_BINS))
     return np.full(gamma.shape, down * across), np.full(gamma.shape, even * across)
 
@@ -402,6 +442,7 @@ def _no_noise_less(
 _NOISE: dict[str, Callable[..., tuple[Floats, Floats]]] = {
     "goldstein": _goldstein_noise,
     "boxcar": _boxcar_noise,
+    "gaussian": _gaussian_noise,
     "none": _no_noise_less,
 }
 

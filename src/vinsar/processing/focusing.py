@@ -98,6 +98,14 @@ class Imaging(Section, name="imaging"):
         "cubic by -79 dB at 4, -93 dB at 6 and -103 dB at 8",
         "not given",
     )
+    surface: Literal["plane", "estimated"] = key(
+        "what the images that make the heights are focused on: the ground plane, or, in a second "
+        "pass with the band and aperture that both channels share there, the surface just found",
+        "section 1.2",
+    )
+    surface_std_m: float = key(
+        "standard deviation of the Gaussian that smooths that surface", "not mentioned", gt=0
+    )
 
 
 def compress(

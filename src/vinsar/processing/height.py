@@ -315,25 +315,46 @@ class Inverted:
     height: Floats
 
 
+def reference(x: Floats, y: Floats, options: Height) -> tuple[Floats, Floats, Floats]:
+    """Return the points of known height that a configuration declares.
+
+    Parameters
+    ----------
+    x, y
+        Axes of the grid, m.
+    options
+        Section ``height``.
+
+    Returns
+    -------
+    tuple of ndarray
+        x, y and height of the points, m.
+    """
+    if options.reference == "level_ground":
+        extents = [(r.x_min_m, r.x_max_m, r.y_min_m, r.y_max_m) for r in options.level_ground]
+        return level_ground(x, y, extents, options.level_ground_height_m)
+    rows = np.array([(p.x_m, p.y_m, p.height_m) for p in options.control_points])
+    return rows[:, 0], rows[:, 1], rows[:, 2]
+
+
 def _dem(products: Products, study: Study) -> xr.Dataset:
     options, unwrapped, images = study.height, products["unwrapped"], products["images"]
     x, y = unwrapped["x"].values, unwrapped["y"].values
-    if options.reference == "level_ground":
-        points = level_ground(
-            x,
-            y,
-            [(r.x_min_m, r.x_max_m, r.y_min_m, r.y_max_m) for r in options.level_ground],
-            options.level_ground_height_m,
-        )
+    if "refined" in products:
+        # The second pass in place of the first: the same quantities, from images of its own.
+        refined = unwrapped = products["refined"]
+        images = images.isel(channel=[0, -1]).assign(image=refined["image"])
+        formed, smooth = refined, refined[["filtered"]].rename(filtered="interferogram")
     else:
-        rows = np.array([(p.x_m, p.y_m, p.height_m) for p in options.control_points])
-        points = rows[:, 0], rows[:, 1], rows[:, 2]
+        images = images.isel(channel=[0, -1])
+        formed, smooth = products["interferogram"], products["filtered"]
+    points = reference(x, y, options)
     offset = phase_offset(unwrapped, images, points, trend=options.trend)
     found = invert(unwrapped, images, offset)
     std, kind = assessment.assess(
         images,
-        products["interferogram"],
-        products["filtered"],
+        formed,
+        smooth,
         phase=found.phase,
         height=found.height,
         true_y=found.true_y,
@@ -409,6 +430,7 @@ STAGES = {
             "filtering",
             "height",
         ),
+        optional=("refined",),
     ),
 }
 

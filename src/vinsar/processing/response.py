@@ -291,6 +291,11 @@ def _boxcar(values: Complexes, *, boxcar_window_px: int, **_: Any) -> Response:
     return Average(np.full(boxcar_window_px, 1 / boxcar_window_px))
 
 
+def _gaussian(values: Complexes, *, gaussian_std_px: float, **_: Any) -> Response:
+    del values
+    return Average(gaussian_weights(gaussian_std_px))
+
+
 def _none(values: Complexes, **_: Any) -> Response:
     del values
     return Average(np.ones(1))
@@ -299,6 +304,7 @@ def _none(values: Complexes, **_: Any) -> Response:
 RESPONSES: dict[str, Callable[..., Response]] = {
     "goldstein": _goldstein,
     "boxcar": _boxcar,
+    "gaussian": _gaussian,
     "none": _none,
 }
 """The filters' responses by their names in `filtering.FILTERS`, with the same arguments."""

@@ -14,7 +14,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import interferogram
+from vinsar.processing import cycles, interferogram
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -137,11 +137,17 @@ def _snaphu(values: Complexes, coherence: Floats, looks: float) -> Floats:
     return np.asarray(unwrapped)
 
 
+def _baselines(values: Complexes, coherence: Floats, looks: float) -> Floats:
+    del coherence, looks  # The shorter baselines tell all of it (`vinsar.processing.cycles`).
+    return np.angle(values).astype(float)
+
+
 UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float], Floats]] = {
     "whirlwind": _whirlwind,
     "skimage": _skimage,
     "kamui": _kamui,
     "snaphu": _snaphu,
+    "baselines": _baselines,
 }
 
 
@@ -149,7 +155,14 @@ class Unwrapping(Section, name="unwrapping"):
     """Phase unwrapping."""
 
     method: Literal[*UNWRAPPERS] = key(  # type: ignore[valid-type]
-        "the unwrapper; snaphu has to be installed by you", "section 2.3, reference 15"
+        "the unwrapper; snaphu has to be installed by you; `baselines` takes each pixel's cycle "
+        "from shorter ones alone (radar.baselines_m), which put the others' cycles right as well",
+        "section 2.3, reference 15",
+    )
+    cycle_window_m: float = key(
+        "side of the window over whose median shorter baselines settle the cycle",
+        "not mentioned",
+        gt=0,
     )
 
 
@@ -196,12 +209,24 @@ def unwrap(
 
 
 def _unwrapped(products: Products, study: Study) -> xr.Dataset:
-    return unwrap(
+    method = study.unwrapping.method
+    result = unwrap(
         products["filtered"],
         products["interferogram"]["coherence"],
-        method=study.unwrapping.method,
+        method=method,
         looks=interferogram.looks(products["trajectory"], study),
     )
+    if "short_baselines" in products:
+        phase = cycles.settle(
+            result["phase"].values,
+            products["short_baselines"]["told_phase"].values,
+            window_px=cycles.window(
+                study.unwrapping.cycle_window_m, result["x"].values, result["y"].values
+            ),
+            unwrapped=method != "baselines",
+        )
+        result["phase"].values[:] = phase
+    return result
 
 
 STAGES = {
@@ -209,6 +234,7 @@ STAGES = {
         _unwrapped,
         inputs=("filtered", "interferogram", "trajectory"),
         sections=(*interferogram.LOOKS_KEYS, "unwrapping"),
+        optional=("short_baselines",),
     ),
 }
 

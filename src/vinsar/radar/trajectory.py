@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import Section, key
-from vinsar.foundations.constants import CHANNELS
+from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.radar import aperture, geometry, grid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
@@ -29,6 +31,7 @@ KEYS = (
     "radar.position_spacing_m",
     "radar.rail_height_m",
     "radar.baseline_m",
+    "radar.baselines_m",
     "radar.baseline_angle_deg",
     "radar.transmitter_x_m",
     "radar.transmitter_y_m",
@@ -78,6 +81,11 @@ class Radar(Section, name="radar"):
         "Table 1",
         gt=0,
     )
+    baselines_m: Annotated[tuple[float, ...], Field(strict=False, min_length=1)] | None = key(
+        "distances of all antennas above the lower one (transmitters, arrays), rising; the last is "
+        "baseline_m, and shorter ones settle its phase's whole cycles; null for baseline_m alone",
+        "not mentioned",
+    )
     baseline_angle_deg: float = key(
         "attitude of the baseline from horizontal, beta; 90 is vertical", "Table 1", ge=0, le=180
     )
@@ -88,6 +96,11 @@ class Radar(Section, name="radar"):
     transmitter_y_m: float = key("its place ahead of the array", "not given")
     transmitter_height_m: float = key("its height above ground", "not given", gt=0)
     dwell_s: float = key("time for each frequency of an array's sweep", "not given", gt=0, le=1)
+
+    @property
+    def baselines(self) -> tuple[float, ...]:
+        """Distances of all antennas above the lower one, m; the longest is the last."""
+        return self.baselines_m or (self.baseline_m,)
 
 
 def planned(radar: Radar) -> xr.Dataset:
@@ -103,8 +116,8 @@ def planned(radar: Radar) -> xr.Dataset:
     xarray.Dataset
         Product ``trajectory``.
     """
-    baseline = {
-        "baseline_m": radar.baseline_m,
+    baseline: dict[str, Any] = {
+        "baseline_m": radar.baselines,
         "baseline_angle_deg": radar.baseline_angle_deg,
     }
     if radar.system == "rail":
@@ -129,13 +142,13 @@ def rail(
     aperture_length_m: float,
     position_spacing_m: float,
     rail_height_m: float,
-    baseline_m: float,
+    baseline_m: float | Sequence[float],
     baseline_angle_deg: float,
 ) -> xr.Dataset:
-    """Return the positions of two monostatic antennas on one cart that runs along a roof rail.
+    """Return the positions of monostatic antennas on one cart that runs along a roof rail.
 
     The rail is centred on x = 0 at y = 0; the lower antenna runs at the rail's height, the upper
-    one a baseline away from it in the plane across the rail.
+    one a baseline away from it in the plane across the rail, and others may be between them.
 
     Parameters
     ----------
@@ -146,7 +159,7 @@ def rail(
     rail_height_m
         Height H0 of the lower antenna, m.
     baseline_m
-        Distance B between the antennas, m.
+        Distance B between the antennas, m; for more than two, of each from the lower one, rising.
     baseline_angle_deg
         Attitude beta of the baseline from horizontal, degrees; 90 is vertical.
 
@@ -161,7 +174,7 @@ def rail(
         If the spacing does not divide the length.
     """
     line = _line(aperture_length_m, position_spacing_m, rail_height_m)
-    antennas = np.stack([line, line + _baseline(baseline_m, baseline_angle_deg)])
+    antennas = line + _baselines(baseline_m, baseline_angle_deg)
     return variables.dataset("trajectory", {"transmitter": antennas, "receiver": antennas.copy()})
 
 
@@ -172,7 +185,7 @@ def switched_array(
     element_spacing_m: float,
     array_height_m: float,
     transmitter: tuple[float, float, float],
-    baseline_m: float,
+    baseline_m: float | Sequence[float],
     baseline_angle_deg: float,
 ) -> xr.Dataset:
     """Return the positions of a switched array: one end of each path stands still.
@@ -192,7 +205,8 @@ def switched_array(
     transmitter
         Position of the transmitter, the lower one of two, m.
     baseline_m
-        Distance B between the transmitters, or between the arrays, m.
+        Distance B between the transmitters, or between the arrays, m; for more than two, of each
+        from the lower one, rising.
     baseline_angle_deg
         Attitude beta of the baseline from horizontal, degrees; 90 is vertical.
 
@@ -208,7 +222,7 @@ def switched_array(
     """
     line = _line(array_length_m, element_spacing_m, array_height_m)
     still = np.broadcast_to(np.array(transmitter, float), line.shape)
-    step = np.stack([np.zeros(3), _baseline(baseline_m, baseline_angle_deg)])[:, None]
+    step = _baselines(baseline_m, baseline_angle_deg)
     between_transmitters = baseline_between == "transmitters"
     return variables.dataset(
         "trajectory",
@@ -221,8 +235,9 @@ def switched_array(
 
 def samples(radar: Radar) -> int:
     """Return the samples of a scan: channels x positions x frequencies."""
+    channels = 2 if radar.baselines_m is None else len(radar.baselines_m) + 1
     positions = round(radar.aperture_length_m / radar.position_spacing_m) + 1
-    return len(CHANNELS) * positions * radar.frequency_count
+    return channels * positions * radar.frequency_count
 
 
 def scan_duration(radar: Radar, vehicle: Any) -> float:
@@ -239,6 +254,7 @@ def scan_duration(radar: Radar, vehicle: Any) -> float:
 
 
 SCAN_KEYS = (
+    "radar.baselines_m",
     "radar.system",
     "radar.aperture_length_m",
     "radar.position_spacing_m",
@@ -253,15 +269,17 @@ def _line(length_m: float, spacing_m: float, height_m: float) -> NDArray[np.floa
     return np.stack([x, np.zeros(x.size), np.full(x.size, height_m)], axis=-1)
 
 
-def _baseline(length_m: float, angle_deg: float) -> NDArray[np.floating]:
+def _baselines(lengths_m: float | Sequence[float], angle_deg: float) -> NDArray[np.floating]:
+    """Return where the channels stand from the lower one (channel, 1, axis), m."""
     beta = np.deg2rad(angle_deg)
     # The paper's vertical baseline has no y offset at all, not 1e-17 m.
     across = 0.0 if angle_deg == 90 else np.cos(beta)
-    return length_m * np.array([0.0, across, np.sin(beta)])
+    lengths = np.concatenate([[0.0], np.atleast_1d(lengths_m)])
+    return lengths[:, None, None] * np.array([0.0, across, np.sin(beta)])
 
 
 def apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
-    """Return the aperture of each channel.
+    """Return the apertures of the lower and the upper channel, whatever is between them.
 
     Parameters
     ----------
@@ -273,6 +291,12 @@ def apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
     list of aperture.Aperture
         Straight lines through the positions (`aperture.fit`), by channel.
     """
+    found = all_apertures(trajectory)
+    return [found[0], found[-1]] if len(found) > 1 else found
+
+
+def all_apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
+    """Return the aperture of each channel, as `apertures` does of two."""
     ends = trajectory["transmitter"].values, trajectory["receiver"].values
     return [aperture.fit(*channel) for channel in zip(*ends, strict=True)]
 
@@ -324,6 +348,29 @@ def _trajectory(products: Products, study: Study) -> xr.Dataset:
     return planned(study.radar)
 
 
+def _baselines_rise(radar: Radar) -> Iterator[Fault]:
+    lengths = radar.baselines
+    if lengths[0] <= 0 or any(a >= b for a, b in pairwise(lengths)):
+        yield Fault("radar.baselines_m", lengths, "must rise from above 0, no two of them equal")
+    elif lengths[-1] != radar.baseline_m:
+        yield Fault(
+            "radar.baselines_m",
+            lengths,
+            f"must end with radar.baseline_m, {radar.baseline_m:g} m: make the two the same",
+        )
+
+
+def _baselines_tell(radar: Radar) -> Iterator[Fault]:
+    least = SPEED_OF_LIGHT / (radar.start_frequency_hz + radar.stop_frequency_hz) / 2
+    if radar.baselines_m is not None and radar.baselines[0] < least:
+        yield Fault(
+            "radar.baselines_m",
+            radar.baselines[0],
+            f"is shorter than a quarter of the wavelength, {least:.4f} m: its phase hardly "
+            "changes with height",
+        )
+
+
 def _waveform(radar: Radar) -> Iterator[Fault]:
     if radar.start_frequency_hz >= radar.stop_frequency_hz:
         yield Fault(
@@ -342,4 +389,6 @@ STAGES = {
 }
 
 
-CHECKS = (_waveform,)
+CHECKS = (_waveform, _baselines_rise)
+
+ADVICE = (_baselines_tell,)

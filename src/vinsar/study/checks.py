@@ -5,6 +5,7 @@ A rule is called with the sections that its parameters name and yields what is w
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from vinsar.processing.height import Height
     from vinsar.processing.interferogram import Interferogram
     from vinsar.processing.leakage import Suppression
+    from vinsar.processing.unwrapping import Unwrapping
     from vinsar.radar.motion import Vehicle
     from vinsar.radar.trajectory import Radar
     from vinsar.simulation.echo import Echo
@@ -416,6 +418,32 @@ def _claims_of_a_rail(radar: Radar, outputs: Outputs) -> Iterator[Fault]:
         yield Fault("outputs.claims", True, "must be false: the paper's claims are those of a rail")
 
 
+def _baselines_settle(radar: Radar, unwrapping: Unwrapping) -> Iterator[Fault]:
+    if unwrapping.method == "baselines" and len(radar.baselines) < 2:
+        yield Fault(
+            "unwrapping.method",
+            unwrapping.method,
+            "needs radar.baselines_m with two baselines or more: one alone tells no cycle",
+        )
+
+
+def _antennas_fit(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
+    if len(radar.baselines) < 2:
+        return
+    pixels = np.prod([axis.size for axis in grid.image_axes(imaging)])
+    samples = (radar.aperture_length_m / radar.position_spacing_m + 1) * radar.frequency_count
+    # Echoes clean and received, of 16 bytes a sample, and images of 8 bytes a pixel.
+    needed = (2 * 16 * samples + 8 * pixels) * (len(radar.baselines) + 1)
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > there / 2:
+        yield Fault(
+            "radar.baselines_m",
+            f"{len(radar.baselines) + 1} antennas",
+            f"their echoes and images take {needed / 1e9:.1f} GB, and half of this machine's "
+            f"memory is {there / 2e9:.1f} GB: take fewer antennas, or a coarser grid",
+        )
+
+
 def _baseline_short(radar: Radar, scene: Scene) -> Iterator[Fault]:
     x = float(np.clip(0.0, scene.x_min_m, scene.x_max_m))
     limit = float(_planned(radar).critical_baseline(x, scene.y_min_m)) / 4
@@ -564,7 +592,8 @@ def _reference_near_ground(scene: Scene, height: Height) -> Iterator[Fault]:
 
 
 CHECKS = (
-    # Antennas in the scene would only confuse the others.
+    # Too many antennas would not get through the others, and those in the scene confuse them.
+    (_antennas_fit,),
     (_ahead,),
     (
         _reference_in_image,
@@ -586,6 +615,7 @@ CHECKS = (
         _told_short,
         _something_scatters,
         _path_of_positions,
+        _baselines_settle,
     ),
 )
 """In groups: what a group finds wrong is kept from the next."""

@@ -54,11 +54,11 @@ def _ordered(declared: dict[str, Stage]) -> dict[str, Stage]:
 
     def visit(name: str) -> None:
         if name in declared and name not in found:
-            for source in declared[name].inputs:
+            for source in (*declared[name].inputs, *declared[name].optional):
                 visit(source)
             found[name] = declared[name]
 
-    read = {source for stage in declared.values() for source in stage.inputs}
+    read = {source for stage in declared.values() for source in (*stage.inputs, *stage.optional)}
     for name in declared:
         if name not in read:
             visit(name)

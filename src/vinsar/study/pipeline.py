@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from vinsar.foundations.constants import CHANNELS
 from vinsar.study.composition import STAGES
 from vinsar.study.options import SIMULATION
 
@@ -38,13 +37,14 @@ def from_files(study: Study) -> tuple[str, ...]:
 def stages(study: Study) -> dict[str, Stage]:
     """Return the stages that a study has, in order.
 
-    Measured echoes come without the true scene: what is computed from it, or would compare with
-    it, is left out.
+    Those that its options ask for. Measured echoes come without the true scene: what is computed
+    from it, or would compare with it, is left out.
     """
+    wanted = {n: stage for n, stage in STAGES.items() if stage.when is None or stage.when(study)}
     if study.measurement.file is None:
-        return STAGES
+        return wanted
     found: dict[str, Stage] = {}
-    for name, stage in STAGES.items():
+    for name, stage in wanted.items():
         simulated = any(key.split(".")[0] in SIMULATION for key in stage.sections)
         known = set(stage.inputs) <= {*MEASURED, *found}
         if name not in MEASURED and known and not simulated:
@@ -77,15 +77,22 @@ def run_stage(name: str, products: Mapping[str, xr.Dataset], study: Study) -> xr
     if not stage.by_channel:
         return stage.compute(inputs, part)
     return join_channels(
-        [stage.compute(split_channel(inputs, channel), part) for channel in CHANNELS]
+        [
+            stage.compute(split_channel(inputs, number), part)
+            for number in range(channel_count(inputs.values()))
+        ]
     )
 
 
-def split_channel(products: Mapping[str, xr.Dataset], channel: str) -> Products:
+def channel_count(products: Iterable[xr.Dataset]) -> int:
+    """Return how many channels some products have."""
+    return max(product.sizes.get("channel", 1) for product in products)
+
+
+def split_channel(products: Mapping[str, xr.Dataset], number: int) -> Products:
     """Return one channel's part of each product."""
-    index = [CHANNELS.index(channel)]
     return {
-        name: product.isel(channel=index) if "channel" in product.dims else product
+        name: product.isel(channel=[number]) if "channel" in product.dims else product
         for name, product in products.items()
     }
 
@@ -170,7 +177,7 @@ def needed(
 
     def want(name: str) -> None:
         wanted.add(name)
-        for source in available[name].inputs:
+        for source in (*available[name].inputs, *available[name].optional):
             if source in available:
                 want(source)
 

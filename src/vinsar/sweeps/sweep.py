@@ -316,6 +316,10 @@ class _Product:
             self._whole = whole
         return self._whole
 
+    def names(self) -> list[str]:
+        parts = [data["channel"].values for data, _ in self.parts if "channel" in data.dims]
+        return [str(label) for labels in parts for label in labels]
+
     def channel(self, index: int) -> tuple[xr.Dataset, str]:
         if len(self.parts) > 1:
             return self.parts[index]
@@ -323,10 +327,11 @@ class _Product:
         if "channel" not in data.dims:
             return self.parts[0]
         if self._channels is None:
-            split = [pipeline.split_channel({"": data}, label)[""] for label in CHANNELS]
+            labels = [str(label) for label in data["channel"].values]
+            split = [pipeline.split_channel({"": data}, n)[""] for n in range(len(labels))]
             self._channels = [
                 (part, _identity(part, _digest(name, label)))
-                for part, label in zip(split, CHANNELS, strict=True)
+                for part, label in zip(split, labels, strict=True)
             ]
         return self._channels[index]
 
@@ -371,7 +376,7 @@ class Memo:
 
     def _products(self, wanted: tuple[str, ...], study: Study, given: Given) -> Products:
         made = {name: _Product([product]) for name, product in given.items()}
-        stages = pipeline.needed(wanted)
+        stages = pipeline.needed(wanted, pipeline.stages(study))
         values = study.values({name for stage in stages.values() for name in stage.sections})
         for name, stage in stages.items():
             setting = {key: values[key] for key in stage.sections}
@@ -388,7 +393,7 @@ class Memo:
                             {key: product.channel(index) for key, product in inputs.items()},
                             compute,
                         ).parts[0]
-                        for index, label in enumerate(CHANNELS)
+                        for index, label in enumerate(_channels(inputs.values()))
                     ]
                 )
             else:
@@ -424,6 +429,10 @@ class Memo:
                     kept.pop(key, None)
                 future.set_exception(error)
         return future.result()
+
+
+def _channels(products: Iterable[_Product]) -> list[str]:
+    return next(filter(None, (product.names() for product in products)))
 
 
 def _compute(stage: Stage, setting: dict[str, Any], products: Products) -> xr.Dataset:
@@ -479,7 +488,8 @@ def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -
     visible = ~truth["shadow"].values
     row["coherence"] = float(np.median(interferogram["coherence"].values[visible]))
     row["residues"] = int(np.abs(unwrapped["residue"].values).sum())
-    row |= {str(name): values.values.tolist() for name, values in focus.data_vars.items()}
+    ends = focus.sel(channel=list(CHANNELS))
+    row |= {str(name): values.values.tolist() for name, values in ends.data_vars.items()}
     if _OF_OBJECTS in products:
         found = products[_OF_OBJECTS].data_vars
         row |= {str(name): values.values.tolist() for name, values in found.items()}
