@@ -115,6 +115,18 @@ def test_what_is_promised_is_held_against_the_errors(scored):
     assert np.isnan(list(accuracy.coverage(np.array([np.nan]), np.ones(1)).values())).all()
 
 
+def test_fifths_by_standard_deviation_hold_as_many_cells_each():
+    std = np.arange(1.0, 11.0)
+    found = accuracy.calibration(np.append(std[::-1], np.nan)[::-1], np.append(np.nan, std))
+    np.testing.assert_allclose(
+        found["binned_std"], np.sqrt(np.arange(1, 10, 2) ** 2 / 2 + np.arange(2, 11, 2) ** 2 / 2)
+    )
+    np.testing.assert_allclose(found["binned_error"], found["binned_std"])
+    np.testing.assert_array_equal(found["binned_coverage"], 1)
+    few = accuracy.calibration(np.zeros(3), np.ones(3))
+    assert np.isnan(few["binned_coverage"]).all()
+
+
 def test_hidden_ground_that_is_delivered_and_visible_ground_that_is_not():
     shadow = np.zeros((5, 6), bool)
     shadow[1:4, 1:] = True

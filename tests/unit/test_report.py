@@ -90,6 +90,8 @@ def accuracy() -> Any:
         if name not in data:
             data[name] = np.array([0.01, 0.02, 0.03, 0.005]) * (number + 1)
     data["cell_count"] = np.array([4, 3, 1, 3])
+    data["binned_std"] = data["binned_error"] = 0.01 * np.arange(5)
+    data["binned_coverage"] = np.full((5, 2), 0.7)
     data["hidden_delivered"], data["visible_withheld"] = 0.01, 0.04
     axis = np.array([0.0, 0.1])
     regions = np.array(["whole_scene", "visible_ground", "shadow", "delivered"])

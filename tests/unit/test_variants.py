@@ -30,7 +30,15 @@ def test_a_study_and_its_variants_are_run(study, results):
 
 
 def test_the_table_has_a_row_a_variant_with_its_numbers(results):
-    rows = variants.as_markdown(results).splitlines()[2:]
+    first, second = variants.as_markdown(results).split("\n\n")
+    rows = first.splitlines()[2:]
+    delivered = second.splitlines()[2:]
+    for row, (name, accuracy) in zip(delivered, results.items(), strict=True):
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        part = accuracy.sel(region="delivered")
+        assert cells[0] == name
+        assert cells[1] == f"{100 * float(part['share_of_scene']):.1f} %"
+        assert cells[5].startswith(f"{100 * float(part['coverage_1_sigma']):.1f} % (")
     for row, (name, accuracy) in zip(rows, results.items(), strict=True):
         cells = [cell.strip() for cell in row.strip("|").split("|")]
         scene = accuracy.sel(region="whole_scene")

@@ -101,12 +101,39 @@ VARIABLES = {
     "visible_withheld": Variable(
         (), "real", "1", "share of the visible ground that is not delivered"
     ),
+    "binned_std": Variable(
+        ("std_bin",), "real", "m", "root mean square of the standard deviations of the bin's cells"
+    ),
+    "binned_error": Variable(
+        ("std_bin",), "real", "m", "root mean square of the height errors of the bin's cells"
+    ),
+    "binned_coverage": Variable(
+        ("std_bin", "sigmas"),
+        "real",
+        "1",
+        "share of the bin's heights with an error within so many standard deviations",
+    ),
     "cell_count": Variable(("region",), "integer", "1", "number of cells in the region"),
     "tolerance": Variable((), "real", "m", "height error that counts as within"),
 }
 """Variables of the product ``accuracy``."""
 
-variables.declare("accuracy", VARIABLES)
+variables.declare(
+    "accuracy",
+    VARIABLES,
+    coordinates={
+        "std_bin": Variable(
+            ("std_bin",), "integer", "1", "fifth of what is delivered, by its standard deviation"
+        ),
+        "sigmas": Variable(("sigmas",), "integer", "1", "number of standard deviations"),
+    },
+)
+
+BINS = 5
+"""Parts, of as many cells each, into which what is delivered is divided by standard deviation."""
+
+SIGMAS = (1, 2)
+"""Intervals whose coverage is counted, in standard deviations."""
 
 
 class Accuracy(Section, name="accuracy"):
@@ -171,7 +198,39 @@ def coverage(error: NDArray[np.floating], std: NDArray[np.floating]) -> dict[str
     ratio = np.abs(error[known]) / np.maximum(std[known], np.finfo(float).tiny)
     return {
         f"coverage_{times}_sigma": float((ratio <= times).mean()) if ratio.size else np.nan
-        for times in (1, 2)
+        for times in SIGMAS
+    }
+
+
+def calibration(
+    error: NDArray[np.floating], std: NDArray[np.floating]
+) -> dict[str, NDArray[np.floating]]:
+    """Return errors and standard deviations by fifths of the standard deviation.
+
+    Parameters
+    ----------
+    error, std
+        Height errors and their standard deviations (cell,), m; NaN where there is no height.
+
+    Returns
+    -------
+    dict
+        ``binned_std`` and ``binned_error`` (bin,), root mean squares in m, and ``binned_coverage``
+        (bin, interval); NaN where there are fewer cells than bins.
+    """
+    known = np.isfinite(error) & np.isfinite(std)
+    order = np.argsort(std[known], kind="stable")
+    parts = np.array_split(order, BINS) if order.size >= BINS else [order[:0]] * BINS
+    found = [(error[known][part], std[known][part]) for part in parts]
+
+    def root(values: NDArray[np.floating]) -> float:
+        return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
+
+    shares = [list(coverage(*pair).values()) for pair in found]
+    return {
+        "binned_std": np.array([root(own) for _, own in found]),
+        "binned_error": np.array([root(own) for own, _ in found]),
+        "binned_coverage": np.array(shares),
     }
 
 
@@ -238,8 +297,14 @@ def evaluate(dem: xr.Dataset, truth: xr.Dataset, *, tolerance_m: float) -> xr.Da
             "hidden_delivered": _share(valid, inside & exists),
             "visible_withheld": _share(~valid, parts["visible_ground"]),
         }
+        | calibration(error[parts["delivered"]], std[parts["delivered"]])
         | table,
-        {"x": dem["x"].values, "y": dem["y"].values, "region": np.array(REGIONS)},
+        {
+            "x": dem["x"].values,
+            "y": dem["y"].values,
+            "region": np.array(REGIONS),
+            "sigmas": np.array(SIGMAS),
+        },
     )
 
 

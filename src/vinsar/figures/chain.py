@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.figures.drawing import declaration, maps, style, thumbnails
+from vinsar.processing.classification import VALID
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -258,7 +259,20 @@ def _map(
     title = f"{prefix}{PANELS[letter].title}{' (map)' if letter == 'a' else ''}"
     layer = PANELS[letter].layer(products, study)
     axes = maps.draw_layer(figure, box, layer, title, label_x=label_x, label_y=label_y)
+    if letter == "h":
+        maps.hatch(axes, withheld(products["dem"]))
     return maps.outline_shadow(axes, products["truth"]["shadow"])
+
+
+def withheld(dem: xr.Dataset) -> xr.DataArray:
+    """Return where a DEM has heights that are not valid.
+
+    Parameters
+    ----------
+    dem
+        Product ``dem``.
+    """
+    return (dem["height_class"] != VALID) & np.isfinite(dem["height"])
 
 
 def _surface(

@@ -56,17 +56,18 @@ def draw(products: Products, study: Study) -> Figure:
 
     title = "(a) height error, reconstructed minus true"
     axes = maps.draw_layer(figure, (left, bottom, width, height), layer(accuracy), title)
+    maps.hatch(axes, ~accuracy["delivered"] & np.isfinite(error))
     if maps.outline_shadow(axes, accuracy["shadow"]):
         below = bottom + height - style.size_mm(axes)[1] - 11.5
         maps.explain_shadow(figure, left, below, maps.SHADOW_LABEL)
 
     left, room = 102.0, 73.0
-    _histogram(style.place(figure, left, bottom, room, height - 31), accuracy, tolerance)
+    _histogram(style.place(figure, left, bottom, room, height - 39), accuracy, tolerance)
     left, room = left - 11, room + 11
     style.write_title(
         figure, left, bottom + height, "(b) statistics and histogram of the height error"
     )
-    _table(style.place(figure, left, bottom + height - 22, room, 22), accuracy)
+    _table(style.place(figure, left, bottom + height - 27, room, 27), accuracy)
     return figure
 
 
@@ -272,8 +273,9 @@ FIGURES = {
         draw=draw,
         title="Height error",
         caption=(
-            "Reconstructed minus true height as a map, its statistics over the whole scene, "
-            "visible ground and shadow, and its histogram."
+            "Reconstructed minus true height as a map, hatched where it is not delivered, its "
+            "statistics over what is delivered, the whole scene, visible ground and shadow, and "
+            "its histogram."
         ),
         sections=("figures",),
         inputs=("accuracy",),

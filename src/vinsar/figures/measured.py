@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vinsar.figures.chain import PANELS, Panel
+from vinsar.figures.chain import PANELS, Panel, withheld
 from vinsar.figures.drawing import declaration, maps, style
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def draw(products: Products, study: Study) -> Figure:
     for place, panel in enumerate(_SHOWN):
         row, column = divmod(place, 3)
         box = left + column * pitch, bottom + (1 - row) * (height + _TITLE_MM), width, height
-        maps.draw_layer(
+        axes = maps.draw_layer(
             figure,
             box,
             panel.layer(products, study),
@@ -64,6 +64,8 @@ def draw(products: Products, study: Study) -> Figure:
             label_x=row == 1,
             label_y=column == 0,
         )
+        if panel is PANELS["h"]:
+            maps.hatch(axes, withheld(products["dem"]))
     return figure
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vinsar.figures import chain
 from vinsar.figures.drawing import declaration, maps, style, sweeps, thumbnails
 from vinsar.processing import detection
 
@@ -63,6 +64,8 @@ def draw(products: Products, study: Study) -> Figure:
         image = maps.draw(axes, 100 * data, colormap=colours, limits=(-100 * top, 100 * top))
         ends = maps.beyond(data.values, (-top, top))
         maps.colorbar(axes, image, "height (cm)", extend=ends)
+        if data is not truth:
+            maps.hatch(axes, chain.withheld(products["dem"]))
         _outline(axes, study.scene.objects)
 
     contrast = found["contrast"]

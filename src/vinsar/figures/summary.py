@@ -60,9 +60,17 @@ def draw(products: Products, study: Study) -> Figure:
     )
     for place, (letter, name) in enumerate(_SHOWN):
         layer = chain.PANELS[letter].layer(products, study)
-        _map(figure, place, name, layer, products["truth"]["shadow"])
+        hidden = chain.withheld(products["dem"]) if letter == "h" else None
+        _map(figure, place, name, layer, products["truth"]["shadow"], hidden)
     accuracy = products["accuracy"]
-    shaded = _map(figure, 4, "height error", height_error.layer(accuracy), accuracy["shadow"])
+    shaded = _map(
+        figure,
+        4,
+        "height error",
+        height_error.layer(accuracy),
+        accuracy["shadow"],
+        chain.withheld(products["dem"]),
+    )
     if shaded:
         maps.explain_shadow(figure, _LEFT_MM + 2 * _PITCH_MM, 4.0, maps.SHADOW_LABEL)
     for row, (number, meaning) in enumerate(statistics(accuracy)):
@@ -102,31 +110,39 @@ def statistics(accuracy: xr.Dataset) -> list[tuple[str, str]]:
     Returns
     -------
     list of tuple of str
-        The share within the tolerance, and the spread and the worst error in centimetres.
+        What is delivered and what that is worth, then the spread of all heights in centimetres.
     """
+    delivered = accuracy.sel(region="delivered")
     whole = accuracy.sel(region="whole_scene")
-    visible = accuracy.sel(region="visible_ground")
+    tolerance = 100 * float(accuracy["tolerance"])
     return [
         (
+            height_error.written(100 * float(delivered["share_of_scene"]), ".1f") + " %",
+            "of the scene delivered",
+        ),
+        (
+            height_error.written(100 * float(delivered["fraction_within_tolerance"]), ".1f") + " %",
+            f"of that within {tolerance:g} cm",
+        ),
+        (
             height_error.written(100 * float(whole["fraction_within_tolerance"]), ".1f") + " %",
-            f"of the heights within {100 * float(accuracy['tolerance']):g} cm",
+            f"of the scene within {tolerance:g} cm",
         ),
         (
             height_error.written(100 * float(whole["std"]), ".1f") + " cm",
             "standard deviation",
         ),
-        (
-            height_error.written(100 * float(visible["std"]), ".1f") + " cm",
-            "the same, on visible ground",
-        ),
-        (
-            height_error.written(100 * float(whole["maximum_absolute"]), ".0f") + " cm",
-            "largest error",
-        ),
     ]
 
 
-def _map(figure: Figure, place: int, name: str, layer: maps.Layer, shadow: xr.DataArray) -> bool:
+def _map(
+    figure: Figure,
+    place: int,
+    name: str,
+    layer: maps.Layer,
+    shadow: xr.DataArray,
+    withheld: xr.DataArray | None = None,
+) -> bool:
     """Draw a map in the place of this number, by row; return if it has shadow."""
     row, column = divmod(place, 3)
     # No wider than the map, so that its name begins where the map does.
@@ -140,6 +156,8 @@ def _map(figure: Figure, place: int, name: str, layer: maps.Layer, shadow: xr.Da
         fontsize=style.points(8),
         fontweight="bold",
     )
+    if withheld is not None:
+        maps.hatch(axes, withheld)
     return maps.outline_shadow(axes, shadow)
 
 
@@ -149,7 +167,8 @@ FIGURES = {
         title="Front sheet",
         caption=(
             "The study on one sheet: true height, image of the lower antenna, filtered phase, "
-            "reconstructed height, its error, and the error's statistics."
+            "reconstructed height, its error, and the error's statistics. Heights that are not "
+            "delivered are hatched."
         ),
         sections=("figures", "radar"),
         inputs=INPUTS,

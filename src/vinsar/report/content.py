@@ -279,8 +279,12 @@ def _summary(sources: Sources) -> Section:
         visible = accuracy.sel(region="visible_ground")
         tolerance = 100 * float(accuracy["tolerance"])
         share = 100 * float(whole["fraction_within_tolerance"])
+        delivered = accuracy.sel(region="delivered")
+        held = 100 * float(delivered["fraction_within_tolerance"])
         tiles += [
-            (f"{share:.1f} %", f"of the heights within {tolerance:g} cm"),
+            (f"{100 * float(delivered['share_of_scene']):.1f} %", "of the scene delivered"),
+            (f"{held:.1f} %", f"of what is delivered within {tolerance:g} cm"),
+            (f"{share:.1f} %", f"of all heights within {tolerance:g} cm"),
             (f"{100 * float(whole['std']):.1f} cm", "standard deviation, whole scene"),
             (f"{100 * float(visible['std']):.1f} cm", "standard deviation, visible ground"),
         ]

@@ -50,7 +50,7 @@ def as_markdown(results: dict[str, xr.Dataset]) -> str:
     Returns
     -------
     str
-        A row a variant: whole scene and visible ground.
+        A row a variant: whole scene and visible ground; then the same of what is delivered.
     """
     tolerance = 100 * float(next(iter(results.values()))["tolerance"])
     within = f"within {tolerance:g} cm"
@@ -74,4 +74,37 @@ def as_markdown(results: dict[str, xr.Dataset]) -> str:
         *("variant", within, "std", "worst"),
         *(f"visible: {within}", "visible: std", "in shadow"),
     )
-    return tables.write(headings, rows, "lrrrrrr") + "\n"
+    return f"{tables.write(headings, rows, 'lrrrrrr')}\n\n{_delivered(results, within)}\n"
+
+
+def _delivered(results: dict[str, xr.Dataset], within: str) -> str:
+    """Return what each variant delivers, and what its standard deviations are worth."""
+    rows = []
+    for name, accuracy in results.items():
+        part = accuracy.sel(region="delivered")
+        by_std = 100 * accuracy["binned_coverage"]
+        rows.append(
+            (
+                name,
+                f"{100 * float(part['share_of_scene']):.1f} %",
+                f"{100 * float(part['fraction_within_tolerance']):.2f} %",
+                f"{100 * float(part['maximum_absolute']):.1f} cm",
+                f"{100 * float(part['percentile_90_absolute']):.1f} cm",
+                *(
+                    f"{100 * float(part[f'coverage_{count}_sigma']):.1f} % "
+                    f"({float(values.min()):.0f} to {float(values.max()):.0f})"
+                    for count, values in by_std.groupby("sigmas")
+                ),
+                _percent(accuracy["hidden_delivered"]),
+                _percent(accuracy["visible_withheld"]),
+            )
+        )
+    headings = (
+        *("variant", "delivered", within, "worst", "LE90"),
+        *("within 1 std (by fifths)", "within 2 std", "hidden, delivered", "visible, not"),
+    )
+    return tables.write(headings, rows, "lrrrrrrrr")
+
+
+def _percent(share: xr.DataArray) -> str:
+    return f"{100 * float(share):.1f} %" if share.notnull() else "–"

@@ -16,7 +16,7 @@ def test_baseline_length_shows_the_sweep_the_prediction_and_the_optimum(
     length = [0.1, 0.2, 0.3, 0.5, 1.0]
     std = np.array([0.09, 0.05, 0.02, 0.0205, 0.06])
     sweep = make_sweep({"radar.baseline_m": length}, std, realizations=3)
-    sweep["std"].values[:] = std[:, None, None] * np.array([1, 0.5, 2])
+    sweep["std"].values[:] = std[:, None, None] * np.array([1, 0.5, 2, 0.3])
     figure = draw("baseline_length", products | {"sweeps/baseline_length": sweep}, study)
     spreads, ambiguity, coherence = figure.axes
     lines = lines_of(spreads)

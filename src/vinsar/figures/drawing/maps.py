@@ -40,6 +40,10 @@ class Layer:
     phase: bool = False
 
 
+HATCH = "#6b6b6b"
+"""Colour of the hatching over heights that are not delivered."""
+
+
 def edges(data: xr.DataArray) -> tuple[float, float, float, float]:
     """Return the outer edges of a raster's cells: left, right, near, far, m."""
     x, y = data["x"].values, data["y"].values
@@ -272,6 +276,30 @@ def beyond(values: Floats, limits: tuple[float, float]) -> Extend:
         (True, True): "both",
     }
     return names[low, high]
+
+
+def hatch(axes: Axes, withheld: xr.DataArray) -> None:
+    """Hatch the cells whose value is not known.
+
+    Parameters
+    ----------
+    axes
+        A map.
+    withheld
+        Mask (y, x), true where the value is not delivered.
+    """
+    if not withheld.values.any():
+        return
+    hatched = axes.contourf(
+        withheld["x"].values,
+        withheld["y"].values,
+        withheld.values.astype(float),
+        levels=[0.5, 1.5],
+        colors="none",
+        hatches=["/////"],
+    )
+    hatched.set_edgecolor(HATCH)
+    hatched.set_linewidth(0)
 
 
 def outline_shadow(axes: Axes, shadow: xr.DataArray) -> bool:
