@@ -10,6 +10,7 @@ import pytest
 import rasterio
 import xarray as xr
 
+from vinsar import figures
 from vinsar.foundations.configuration import Study
 from vinsar.foundations.errors import ConfigurationError
 from vinsar.results import export, storage
@@ -68,7 +69,7 @@ def own_terrain(path, **scene):
 
 def own_echoes(path, **sections):
     own = {"measurement": {"file": str(path)}, "outputs": {"claims": False}}
-    return ingest.check(tiny(**own, **sections))
+    return ingest.check(tiny(**(own | sections)))
 
 
 def said(file, ask):
@@ -388,7 +389,7 @@ def one_part(data):
         (without("frequency"), "lacks the variable 'frequency'"),
         (one_part, "lacks the variable 'echo_real'"),
         (lambda data: data.rename(position="pulse"), "('channel', 'pulse', 'frequency')"),
-        (lambda data: data.isel(channel=[0]), "dimension 'channel' has lower; it must have lower,"),
+        (lambda data: data.isel(channel=[1]), "dimension 'channel' has upper; it must have lower,"),
         (lambda data: data.isel(channel=[1, 0]), "dimension 'channel' has upper, lower"),
         (
             lambda data: data.isel(channel=[1, 0]).drop_vars("channel"),
@@ -460,6 +461,46 @@ def test_one_antenna_is_told_once(echoes, tmp_path):
     one, two = (ingest.measurement(str(tmp_path / f"{name}.nc")) for name in ("long", "short"))
     for name in pipeline.MEASURED:
         xr.testing.assert_identical(one[name], two[name])
+
+
+def test_one_channel_has_images_and_no_more(echoes, tmp_path, products):
+    one = echoes.isel(channel=0, drop=True).drop_vars("receiver")
+    one.to_netcdf(tmp_path / "one.nc")
+    own = own_echoes(tmp_path / "one.nc", outputs={"claims": False, "figures": ["images"]})
+    assert own.measurement.channels == 1
+    made = pipeline.run(own, given=ingest.read(own))
+    assert {"profiles", "images"} <= set(made)
+    assert not {"interferogram", "unwrapped", "dem", "registration"} & set(made)
+    np.testing.assert_array_equal(made["images"]["image"][0], products["images"]["image"][0])
+    figures.check(own, made)
+    with pytest.raises(validation.ConfigurationError, match="needs a second channel"):
+        figures.check(
+            own_echoes(tmp_path / "one.nc", outputs={"claims": False, "figures": ["measured"]}),
+            made,
+        )
+
+
+def test_an_image_of_one_channel_says_so(echoes, tmp_path):
+    echoes.isel(channel=[0]).to_netcdf(tmp_path / "one.nc")
+    own = own_echoes(tmp_path / "one.nc")
+    made = pipeline.run(own, only="images", given=ingest.read(own))
+    figure = figures.FIGURES["images"].draw(made, own)
+    assert any("of one channel there is no height" in text.get_text() for text in figure.texts)
+
+
+def test_a_radar_high_up_is_refused_for_no_figure_that_nobody_asked_for(echoes, tmp_path):
+    high = echoes.copy(deep=True)
+    for name in ("transmitter", "receiver"):
+        high[name][..., 2] += 60.0
+    high.to_netcdf(tmp_path / "high.nc")
+    imaging = {"y_min_m": 10.0, "y_max_m": 12.0}
+    # Without a figure of misregistration its targets do not matter.
+    ahead = {"claims": False, "figures": ["measured"]}
+    own = own_echoes(tmp_path / "high.nc", imaging=imaging, outputs=ahead)
+    assert "images" in pipeline.run(own, only="images", given=ingest.read(own))
+    ahead["figures"] = ["fig2"]
+    with pytest.raises(validation.ConfigurationError, match="registration"):
+        own_echoes(tmp_path / "high.nc", imaging=imaging, outputs=ahead)
 
 
 def test_interleaved_positions_are_put_in_order(echoes, tmp_path):
@@ -547,9 +588,7 @@ def test_near_and_far_scenes_are_the_direct_sum(tmp_path, radar, imaging):
         imaging={"x_min_m": -half, "x_max_m": half, "interpolation": "cubic"} | imaging,
         height={"level_ground": [{"x_min_m": -half, "x_max_m": 0.0, "y_min_m": imaging["y_min_m"],
                                   "y_max_m": middle}]},
-        registration={"near": {"x_m": 0.0, "y_m": 2 * middle},
-                      "far": {"x_m": 0.0, "y_m": 3 * middle},
-                      "height_min_m": -0.01, "height_max_m": 0.01},
+        outputs={"claims": False, "figures": ["measured"]},
     )  # fmt: skip
     image = pipeline.run(own, only="images", given=ingest.read(own))["images"]
     frequency = radar["frequency"]

@@ -176,7 +176,7 @@ def wanted_products():
     }
     if STUDY.outputs.claims:
         read |= {*claims.INPUTS}
-    read |= {"dem", "accuracy", "focus"}
+    read |= {"dem" if "dem" in STAGES else "images", "accuracy", "focus", "reflectors"}
     return list(pipeline.needed(read.intersection(STAGES), STAGES))
 
 

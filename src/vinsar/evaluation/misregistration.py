@@ -320,12 +320,17 @@ def _heights_rise(registration: Registration) -> Iterator[Fault]:
         )
 
 
+def _of_two(study: Study) -> bool:
+    return study.measurement.channels != 1
+
+
 STAGES = {
     "registration": Stage(
         _registration,
         inputs=("trajectory",),
         sections=(*waveform.KEYS, "imaging", "registration"),
         parallel=True,
+        when=_of_two,
     ),
 }
 

@@ -72,6 +72,17 @@ THUMBNAILS: dict[str, Thumbnail] = {
 """The small pictures by product."""
 
 
+def _lacking(study: Study, name: str) -> str:
+    """Return what a figure needs and a study has not."""
+    figure = FIGURES[name]
+    if "reflectors" in figure.inputs:
+        return "measurement.reflectors"
+    simulated = figure.sweeps or any(part.split(".")[0] == "scene" for part in figure.sections)
+    if study.measurement.channels == 1 and not simulated:
+        return "a second channel"
+    return "the true scene"
+
+
 def check(study: Study, products: Collection[str]) -> None:
     """Refuse a study that asks for figures that do not exist or cannot be drawn.
 
@@ -105,7 +116,9 @@ def check(study: Study, products: Collection[str]) -> None:
         if name in asked[:number]:
             faults.append(Fault(where, name, "is listed twice"))
         if name not in possible:
-            allowed = f"needs the true scene, without which there are {', '.join(possible)}"
+            allowed = (
+                f"needs {_lacking(study, name)}, without which there are {', '.join(possible)}"
+            )
             faults.append(Fault(where, name, allowed))
             continue
         faults += [

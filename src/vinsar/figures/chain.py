@@ -94,12 +94,13 @@ def _reflectivity(products: Products, study: Study) -> maps.Layer:
     return maps.Layer(data, style.colormap("magma"), (0.0, top or 1.0), "reflectivity")
 
 
-def _amplitude(channel: str, products: Products, study: Study) -> maps.Layer:
-    amplitude = abs(products["images"]["image"])
+def amplitude(channel: str, products: Products, study: Study) -> maps.Layer:
+    """Return an image in dB below the brightest pixel of all channels, as a map shows it."""
+    images = abs(products["images"]["image"])
     # One reference for both channels, so that their grey levels compare.
-    top = max(float(amplitude.max()), np.finfo(np.float32).tiny)
-    amplitude = amplitude.sel(channel=channel)
-    data = amplitude.copy(data=20 * np.log10(np.maximum(amplitude.values / top, 1e-20)))
+    top = max(float(images.max()), np.finfo(np.float32).tiny)
+    image = images.sel(channel=channel)
+    data = image.copy(data=20 * np.log10(np.maximum(image.values / top, 1e-20)))
     limits = (-study.figures.amplitude_range_db, 0.0)
     return maps.Layer(
         data, style.colormap("gray"), limits, "amplitude (dB)", maps.beyond(data.values, limits)
@@ -140,8 +141,8 @@ def _unwrapped_phase(products: Products, study: Study) -> maps.Layer:
 PANELS: dict[str, Panel] = {
     "a": Panel("true height", "terrain", _true_height),
     "b": Panel("reflectivity (RCS)", "truth", _reflectivity),
-    "c": Panel("image, lower antenna", "images", partial(_amplitude, "lower")),
-    "d": Panel("image, upper antenna", "images", partial(_amplitude, "upper")),
+    "c": Panel("image, lower antenna", "images", partial(amplitude, "lower")),
+    "d": Panel("image, upper antenna", "images", partial(amplitude, "upper")),
     "e": Panel("raw phase", "interferogram", partial(_wrapped_phase, "interferogram")),
     "f": Panel("filtered phase", "filtered", partial(_wrapped_phase, "filtered")),
     "g": Panel("unwrapped phase", "unwrapped", _unwrapped_phase),

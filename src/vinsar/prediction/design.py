@@ -756,6 +756,14 @@ def as_markdown(sheet: Sheet) -> str:
     lines = [
         f"# Design of the study {study.study}",
         "",
+        *(
+            [
+                "- measured with one channel: heights, coherence and errors of the baseline are "
+                "those that a second antenna at radar.baseline_m would have"
+            ]
+            if study.measurement.channels == 1
+            else []
+        ),
         f"- {part.system}, {part.start_frequency_hz / 1e9:g} to {part.stop_frequency_hz / 1e9:g} "
         f"GHz in {planned.frequency.size} steps, {planned.positions} positions over "
         f"{part.aperture_length_m:g} m, baseline of {part.baseline_m:g} m at "

@@ -133,8 +133,14 @@ def _odd_window(interferogram: Interferogram) -> Iterator[Fault]:
         yield Fault("interferogram.coherence_window_px", window, "must be odd")
 
 
+def _of_two(study: Study) -> bool:
+    return study.measurement.channels != 1
+
+
 STAGES = {
-    "interferogram": Stage(_interferogram, inputs=("images",), sections=("interferogram",)),
+    "interferogram": Stage(
+        _interferogram, inputs=("images",), sections=("interferogram",), when=_of_two
+    ),
 }
 
 

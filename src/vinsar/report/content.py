@@ -304,6 +304,8 @@ def _radar(study: Study) -> Section:
         extra: Any = info.json_schema_extra
         if study.radar.system == "rail" and name in _OF_ARRAYS:
             continue
+        if study.measurement.channels == 1 and name.startswith("baseline"):
+            continue
         shown = with_unit(name, value)
         rows.append((f"`{name}`", str(info.description), shown, str(extra["paper"])))
     given = Table(
@@ -368,6 +370,10 @@ def quantities(study: Study) -> list[tuple[str, str, str]]:
         ("resolution on the ground in y", f"{cell[1]:.1f}", "cm"),
         ("slant range of the lower channel", f"{slant:.3f}", "m"),
         ("its look angle from nadir, θ", f"{np.degrees(look):.2f}", "°"),
+    ]
+    if study.measurement.channels == 1:
+        return rows
+    rows += [
         ("critical baseline of this attitude", f"{critical:.2f}", "m"),
         ("a quarter of it, the rule of thumb", f"{critical / 4:.2f}", "m"),
         ("coherence of level ground", f"{float(planned.geometric_coherence(*place)):.3f}", ""),

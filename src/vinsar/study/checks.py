@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.foundations.errors import Fault
-from vinsar.radar import aperture, grid, motion, trajectory, waveform
+from vinsar.radar import aperture, grid, instrument, motion, trajectory, waveform
 from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
@@ -182,7 +182,16 @@ def _has_image(height: float, ahead: float, antenna: float) -> bool:
     return height < antenna and ahead**2 + antenna**2 > (antenna - height) ** 2
 
 
-def _heights_below_antennas(radar: Radar, registration: Registration) -> Iterator[Fault]:
+def _registration_matters(measurement: Measurement, outputs: Outputs) -> bool:
+    """Tell whether the targets do: those of a measurement only if a figure shows them."""
+    return measurement.file is None or "fig2" in outputs.figures
+
+
+def _heights_below_antennas(
+    radar: Radar, registration: Registration, measurement: Measurement, outputs: Outputs
+) -> Iterator[Fault]:
+    if not _registration_matters(measurement, outputs):
+        return
     for name in ("height_max_m", "map_height_m"):
         if getattr(registration, name) >= radar.rail_height_m:
             yield Fault(
@@ -397,7 +406,11 @@ def _gate_before_image(radar: Radar, suppression: Suppression, imaging: Imaging)
         )
 
 
-def _targets_imaged(radar: Radar, registration: Registration) -> Iterator[Fault]:
+def _targets_imaged(
+    radar: Radar, registration: Registration, measurement: Measurement, outputs: Outputs
+) -> Iterator[Fault]:
+    if not _registration_matters(measurement, outputs):
+        return
     planned = _planned(radar)
     heights = np.array([registration.height_min_m, registration.height_max_m])
     for name, target in (("near", registration.near), ("far", registration.far)):
@@ -464,6 +477,21 @@ def _elements_dense(radar: Radar, scene: Scene) -> Iterator[Fault]:
             radar.position_spacing_m,
             f"is wider than {most:.4f} m: grating lobes of the array fold the scene's edges over "
             "each other",
+        )
+
+
+def _heights_tell(radar: Radar, imaging: Imaging, measurement: Measurement) -> Iterator[Fault]:
+    if measurement.file is None or measurement.channels == 1:
+        return
+    planned, middle = _planned(radar), instrument.middle(imaging)
+    cycle = float(planned.height_of_ambiguity(*middle))
+    distance = float(planned.slant_range(*middle))
+    if cycle > distance:
+        yield Fault(
+            "radar.baseline_m",
+            radar.baseline_m,
+            f"measured, has a height of ambiguity of {cycle:.3g} m in the middle of the image, "
+            f"{distance:.3g} m away: heights mean nothing, phase and coherence do",
         )
 
 
@@ -625,6 +653,7 @@ ADVICE = (
     _elements_dense,
     _facets_coarse,
     _grid_fine,
+    _heights_tell,
     _coupling_in_gate,
     _image_in_scene,
     _sides_apart,

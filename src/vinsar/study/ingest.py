@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.foundations import variables
-from vinsar.foundations.constants import AXES, CHANNELS
+from vinsar.foundations.constants import AXES, channel_names
 from vinsar.foundations.errors import ConfigurationError, Fault
 from vinsar.radar import geometry, grid, trajectory, waveform
 from vinsar.radar.trajectory import ANTENNAS
@@ -102,7 +102,8 @@ def check(raw: Mapping[str, Any]) -> Study:
         near = (raw.get("imaging") or {}).get("y_min_m")
         if isinstance(near, float):
             _refuse_misplaced(antennas, near)
-    study = validation.check(validation.merge(raw, {"radar": _radar(frequency, antennas)}))
+    found = {"radar": _radar(frequency, antennas), "measurement": {"channels": len(antennas[0])}}
+    study = validation.check(validation.merge(raw, found))
     _refuse_ambiguous(frequency, antennas, study.imaging)
     return study
 
@@ -298,7 +299,7 @@ def _waveform(stored: xr.Dataset) -> tuple[Floats, Antennas]:
     stored = _arranged(stored)
     for part in ("real", "imag"):
         _declared(stored, f"echo_{part}", ("channel", "position", "frequency"), ())
-    for name, labels in (("channel", CHANNELS), ("axis", AXES)):
+    for name, labels in (("channel", channel_names(stored.sizes["channel"])), ("axis", AXES)):
         found = [str(label) for label in _labels(stored, name)]
         if stored.sizes[name] != len(labels) or (found and found != list(labels)):
             shown = ", ".join(found) or f"{stored.sizes[name]} entries"
@@ -390,10 +391,13 @@ def _radar(frequency: Floats, antennas: Antennas) -> dict[str, Any]:
         "rail_height_m": round(float(middle[0, 2]), 9),
     }
     if len(middle) == 1:
-        return found
-    across, up = (middle[-1] - middle[0])[1:]
+        return found | {"baselines_m": None}
+    away = middle[1:] - middle[0]
+    lengths = [round(float(length), 9) for length in np.hypot(away[:, 1], away[:, 2])]
+    across, up = away[-1, 1:]
     return found | {
-        "baseline_m": round(float(np.hypot(across, up)), 9),
+        "baseline_m": lengths[-1],
+        "baselines_m": lengths if len(lengths) > 1 else None,
         "baseline_angle_deg": round(float(np.rad2deg(np.arctan2(up, across))), 9),
     }
 

@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+class Reflector(Section):
+    """A reflector whose place was surveyed."""
+
+    x_m: float = key("its place", "ours")
+    y_m: float = key("its place", "ours")
+    height_m: float = key("height of its phase centre above the ground plane", "ours")
+
+
 class Measurement(Section, name="measurement"):
     """Echoes of your own in place of simulated ones (docs/own-data.md)."""
 
@@ -21,6 +29,12 @@ class Measurement(Section, name="measurement"):
         "netCDF file of measured echoes; paths begin in the repository's folder. The section "
         "`radar` then comes from the file; `scene`, `echo` and `motion` mean nothing",
         "ours",
+    )
+    channels: int | None = key(
+        "how many channels the file has; read from it, whatever is given here", "ours", ge=1
+    )
+    reflectors: Annotated[tuple[Reflector, ...], Field(strict=False)] = key(
+        "surveyed reflectors, which are measured in the images", "ours"
     )
 
 

@@ -45,6 +45,7 @@ SMALL = {
         "level_ground": [{"x_min_m": -0.8, "x_max_m": -0.6, "y_min_m": 10.0, "y_max_m": 10.2}]
     },
     "registration": {"height_count": 3},
+    "measurement": {"reflectors": [{"x_m": 0.4, "y_m": 11.4, "height_m": 0.1}]},
 }
 
 
