@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vinsar.processing import response, uncertainty
+from vinsar.processing import filtering, response, uncertainty
 
 SPACING = 1.0, 1.0
 NONE = {"method": "none", "goldstein_alpha": 0.8, "goldstein_patch_px": 16, "boxcar_window_px": 5}
@@ -43,7 +43,7 @@ def test_intervals_of_a_single_look_hold_what_they_say(coherence):
     images = pair(np.random.default_rng(5), (150, 150), coherence)
     product = images[0] * np.conj(images[1])
     variance = uncertainty.noise_variance(
-        estimate(images), response.of(product, **NONE), product, product, spacing=SPACING
+        estimate(images), filtering.response_to(product, **NONE), product, product, spacing=SPACING
     )
     error = np.abs(np.angle(product)) / np.sqrt(variance)
     # Binomial: 3 sqrt(0.683 * 0.317 / 22 500) = 0.9 %; the von Mises distribution of a dark pixel
@@ -56,7 +56,7 @@ def test_a_pixel_without_signal_has_no_phase():
     images = np.zeros((2, 12, 12), complex)
     product = images[0]
     variance = uncertainty.noise_variance(
-        estimate(images), response.of(product, **NONE), product, product, spacing=SPACING
+        estimate(images), filtering.response_to(product, **NONE), product, product, spacing=SPACING
     )
     np.testing.assert_allclose(variance, np.pi**2 / 3)
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar.processing import classification, response, uncertainty
+from vinsar.processing import classification, uncertainty
+from vinsar.processing.filtering import response_to
 from vinsar.radar import aperture, waveform
 from vinsar.radar.instrument import Instrument
 
@@ -105,7 +106,7 @@ def assess(
     )
     absolute = np.where(np.isfinite(phase), phase, flat)
     bandwidth = float(frequency[-1] - frequency[0]) / waveform.carrier(frequency)
-    filter_ = response.of(product, **filtering)
+    filter_ = response_to(product, **filtering)
     noise = uncertainty.estimate(
         pictures, absolute, flat,
         resolution=resolution, spacing=spacing, relative_bandwidth=bandwidth,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +13,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
+from vinsar.processing import response
 from vinsar.radar import waveform
 
 if TYPE_CHECKING:
@@ -211,13 +213,122 @@ def _none(values: Complexes, **_: Any) -> Complexes:
     return values
 
 
-FILTERS: dict[str, Callable[..., Complexes]] = {
-    "goldstein": _goldstein,
-    "boxcar": _boxcar,
-    "gaussian": _gaussian,
-    "none": _none,
+def _goldstein_noise(
+    gamma: Floats,
+    spectra: Callable[[int], Spectra],
+    *,
+    goldstein_alpha: float,
+    goldstein_patch_px: int,
+    **_: Any,
+) -> tuple[Floats, Floats]:
+    """Return what a patch's expected gain leaves of white and of even noise.
+
+    The expected magnitude spectrum is a peak of the coherence at the ground's fringe and
+    Rayleigh-distributed speckle around it. Where relief spreads the fringe, more is left.
+    """
+    down, even, across = spectra(goldstein_patch_px)
+    powers = np.outer(down, across), np.outer(even, across)
+    magnitude = np.sqrt(np.pi / 4 * powers[0])
+    magnitude[0, 0] = 0
+    shifts = [(row, column) for row in (0, 1, -1) for column in (0, 1, -1)]
+    smoothed = sum(np.roll(magnitude, shift, axis=(0, 1)) for shift in shifts)
+    # Smoothing carries the peak to the bins next to it.
+    near = tuple(np.transpose(shifts))
+    peak = (gamma + smoothed[0, 0]) ** (2 * goldstein_alpha)
+    beside = (gamma[..., None] + smoothed[near]) ** (2 * goldstein_alpha)
+    gain = smoothed ** (2 * goldstein_alpha)
+    gain[near] = 0
+    white, even = ((beside @ power[near] + (gain * power).sum()) / peak for power in powers)
+    return white, even
+
+
+def _boxcar_noise(
+    gamma: Floats, spectra: Callable[[int], Spectra], *, boxcar_window_px: int, **_: Any
+) -> tuple[Floats, Floats]:
+    return _average_noise(np.full(boxcar_window_px, 1 / boxcar_window_px), gamma, spectra)
+
+
+def _gaussian_noise(
+    gamma: Floats, spectra: Callable[[int], Spectra], *, gaussian_std_px: float, **_: Any
+) -> tuple[Floats, Floats]:
+    reach = np.arange(-int(4 * gaussian_std_px), int(4 * gaussian_std_px) + 1)
+    weights = np.exp(-0.5 * (reach / gaussian_std_px) ** 2)
+    return _average_noise(weights / weights.sum(), gamma, spectra)
+
+
+def _average_noise(
+    weights: Floats, gamma: Floats, spectra: Callable[[int], Spectra]
+) -> tuple[Floats, Floats]:
+    gain = np.abs(np.fft.fft(weights, _BINS)) ** 2
+    down, even, across = (float(axis @ gain) for axis in spectra(_BINS))
+    return np.full(gamma.shape, down * across), np.full(gamma.shape, even * across)
+
+
+def _no_noise_less(
+    gamma: Floats, spectra: Callable[[int], Spectra], **_: Any
+) -> tuple[Floats, Floats]:
+    del spectra
+    return np.ones(gamma.shape), np.ones(gamma.shape)
+
+
+def _goldstein_response(
+    values: Complexes, *, goldstein_alpha: float, goldstein_patch_px: int, **_: Any
+) -> response.Response:
+    return response.Goldstein(values, alpha=goldstein_alpha, patch_px=goldstein_patch_px)
+
+
+def _boxcar_response(values: Complexes, *, boxcar_window_px: int, **_: Any) -> response.Response:
+    del values
+    return response.Average(np.full(boxcar_window_px, 1 / boxcar_window_px))
+
+
+def _gaussian_response(values: Complexes, *, gaussian_std_px: float, **_: Any) -> response.Response:
+    del values
+    return response.Average(response.gaussian_weights(gaussian_std_px))
+
+
+def _no_response(values: Complexes, **_: Any) -> response.Response:
+    del values
+    return response.Average(np.ones(1))
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A filter, with what its results are worth.
+
+    All three take, by keyword, the keys of `Filtering`.
+
+    Attributes
+    ----------
+    apply
+        From the complex interferogram to the filtered one.
+    noise
+        From coherence and spectra of the noise to what it leaves of a pixel's white and even noise
+        (`effective_looks`).
+    response
+        From the interferogram that is filtered to the filter's response to phases
+        (`vinsar.processing.response`).
+    """
+
+    apply: Callable[..., Complexes]
+    noise: Callable[..., tuple[Floats, Floats]]
+    response: Callable[..., response.Response]
+
+
+FILTERS: dict[str, Filter] = {
+    "goldstein": Filter(_goldstein, _goldstein_noise, _goldstein_response),
+    "boxcar": Filter(_boxcar, _boxcar_noise, _boxcar_response),
+    "gaussian": Filter(_gaussian, _gaussian_noise, _gaussian_response),
+    "none": Filter(_none, _no_noise_less, _no_response),
 }
-"""The filters by name; each takes the interferogram and, by keyword, the keys of `Filtering`."""
+"""The filters by name."""
+
+
+def find(method: str) -> Filter:
+    """Return a filter by its name; `ValueError` if there is none."""
+    if method not in FILTERS:
+        raise ValueError(f"no filter '{method}'; there are {', '.join(FILTERS)}")
+    return FILTERS[method]
 
 
 class Filtering(Section, name="filtering"):
@@ -261,9 +372,27 @@ def smooth(interferogram: Complexes, *, method: str, **options: Any) -> Complexe
     ValueError
         If there is no such filter.
     """
-    if method not in FILTERS:
-        raise ValueError(f"no filter '{method}'; there are {', '.join(FILTERS)}")
-    return FILTERS[method](interferogram, **options)
+    return find(method).apply(interferogram, **options)
+
+
+def response_to(interferogram: Complexes, *, method: str, **options: Any) -> response.Response:
+    """Return the response to phases of the filter that is applied to an interferogram.
+
+    Parameters
+    ----------
+    interferogram
+        What is filtered (y, x).
+    method
+        A key of `FILTERS`.
+    options
+        The keys of `Filtering` that the filter reads.
+
+    Raises
+    ------
+    ValueError
+        If there is no such filter.
+    """
+    return find(method).response(interferogram, **options)
 
 
 def apply(interferogram: xr.Dataset, **options: Any) -> xr.Dataset:
@@ -330,14 +459,12 @@ def effective_looks(
     ValueError
         If there is no such filter.
     """
-    if method not in _NOISE:
-        raise ValueError(f"no filter '{method}'; there are {', '.join(_NOISE)}")
     gamma, share = np.broadcast_arrays(np.asarray(coherence, float), np.asarray(shifted, float))
 
     def spectra(count: int) -> Spectra:
         return _spectra(count, cell_px, windows)
 
-    white, even = _NOISE[method](gamma, spectra, **options)
+    white, even = find(method).noise(gamma, spectra, **options)
     return np.asarray(1 / (white + share * (even - white)))
 
 
@@ -378,73 +505,6 @@ def _spectra(
         found += [white, (offset <= 1).astype(float)]
     down, even, across = (values / values.sum() for values in found[:3])
     return down, even, across
-
-
-def _goldstein_noise(
-    gamma: Floats,
-    spectra: Callable[[int], Spectra],
-    *,
-    goldstein_alpha: float,
-    goldstein_patch_px: int,
-    **_: Any,
-) -> tuple[Floats, Floats]:
-    """Return what a patch's expected gain leaves of white and of even noise.
-
-    The expected magnitude spectrum is a peak of the coherence at the ground's fringe and
-    Rayleigh-distributed speckle around it. Where relief spreads the fringe, more is left.
-    """
-    down, even, across = spectra(goldstein_patch_px)
-    powers = np.outer(down, across), np.outer(even, across)
-    magnitude = np.sqrt(np.pi / 4 * powers[0])
-    magnitude[0, 0] = 0
-    shifts = [(row, column) for row in (0, 1, -1) for column in (0, 1, -1)]
-    smoothed = sum(np.roll(magnitude, shift, axis=(0, 1)) for shift in shifts)
-    # Smoothing carries the peak to the bins next to it.
-    near = tuple(np.transpose(shifts))
-    peak = (gamma + smoothed[0, 0]) ** (2 * goldstein_alpha)
-    beside = (gamma[..., None] + smoothed[near]) ** (2 * goldstein_alpha)
-    gain = smoothed ** (2 * goldstein_alpha)
-    gain[near] = 0
-    white, even = ((beside @ power[near] + (gain * power).sum()) / peak for power in powers)
-    return white, even
-
-
-def _boxcar_noise(
-    gamma: Floats, spectra: Callable[[int], Spectra], *, boxcar_window_px: int, **_: Any
-) -> tuple[Floats, Floats]:
-    return _average_noise(np.full(boxcar_window_px, 1 / boxcar_window_px), gamma, spectra)
-
-
-def _gaussian_noise(
-    gamma: Floats, spectra: Callable[[int], Spectra], *, gaussian_std_px: float, **_: Any
-) -> tuple[Floats, Floats]:
-    reach = np.arange(-int(4 * gaussian_std_px), int(4 * gaussian_std_px) + 1)
-    weights = np.exp(-0.5 * (reach / gaussian_std_px) ** 2)
-    return _average_noise(weights / weights.sum(), gamma, spectra)
-
-
-def _average_noise(
-    weights: Floats, gamma: Floats, spectra: Callable[[int], Spectra]
-) -> tuple[Floats, Floats]:
-    gain = np.abs(np.fft.fft(weights, _BINS)) ** 2
-    down, even, across = (float(axis @ gain) for axis in spectra(_BINS))
-    return np.full(gamma.shape, down * across), np.full(gamma.shape, even * across)
-
-
-def _no_noise_less(
-    gamma: Floats, spectra: Callable[[int], Spectra], **_: Any
-) -> tuple[Floats, Floats]:
-    del spectra
-    return np.ones(gamma.shape), np.ones(gamma.shape)
-
-
-# What of a pixel's white and even noise (`effective_looks`) each filter leaves.
-_NOISE: dict[str, Callable[..., tuple[Floats, Floats]]] = {
-    "goldstein": _goldstein_noise,
-    "boxcar": _boxcar_noise,
-    "gaussian": _gaussian_noise,
-    "none": _no_noise_less,
-}
 
 
 def _filtered(products: Products, study: Study) -> xr.Dataset:

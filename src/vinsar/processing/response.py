@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from vinsar.radar.decorrelation import Decorrelation
@@ -278,55 +276,3 @@ def rectangle_gain(
         first, second = noise.correlations(axis, lag * spacing[axis])
         own, cross = own * float((first @ weight)[0]), cross * float((second @ weight)[0])
     return float(noise.combine(np.array([own]), np.array([cross]))[0])
-
-
-def _goldstein(
-    values: Complexes, *, goldstein_alpha: float, goldstein_patch_px: int, **_: Any
-) -> Response:
-    return Goldstein(values, alpha=goldstein_alpha, patch_px=goldstein_patch_px)
-
-
-def _boxcar(values: Complexes, *, boxcar_window_px: int, **_: Any) -> Response:
-    del values
-    return Average(np.full(boxcar_window_px, 1 / boxcar_window_px))
-
-
-def _gaussian(values: Complexes, *, gaussian_std_px: float, **_: Any) -> Response:
-    del values
-    return Average(gaussian_weights(gaussian_std_px))
-
-
-def _none(values: Complexes, **_: Any) -> Response:
-    del values
-    return Average(np.ones(1))
-
-
-RESPONSES: dict[str, Callable[..., Response]] = {
-    "goldstein": _goldstein,
-    "boxcar": _boxcar,
-    "gaussian": _gaussian,
-    "none": _none,
-}
-"""The filters' responses by their names in `filtering.FILTERS`, with the same arguments."""
-
-
-def of(interferogram: Complexes, *, method: str, **options: Any) -> Response:
-    """Return the response of the filter that was applied to an interferogram.
-
-    Parameters
-    ----------
-    interferogram
-        What was filtered (y, x).
-    method
-        A key of `RESPONSES`.
-    options
-        The keys of the section ``filtering``.
-
-    Raises
-    ------
-    ValueError
-        If there is no such filter.
-    """
-    if method not in RESPONSES:
-        raise ValueError(f"no response of a filter '{method}'; there are {', '.join(RESPONSES)}")
-    return RESPONSES[method](interferogram, **options)
