@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from vinsar.paper import claims
 from vinsar.processing import detection
@@ -67,6 +68,28 @@ def test_every_claim_of_figures_2_to_5_is_decided(products, study):
         "F2-sign", "F2-centre", "F2-near-far", "S12-vertical", "S12-critical", "F3-speckle",
         "F3-unwrapped", "F4-95", "F4-std", "F4-max", "F4-alarm", "F5-y", "F5-xz", "F5-bounded",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("common", "independent", "verdict"),
+    [(0.026, 0.025, "contradicted"), (0.026, 0.027, "partly"), (0.05, 0.6, "reproduced")],
+)
+def test_whether_y_must_be_measured_follows_the_sweep_with_autofocus(
+    products, study, common, independent, verdict
+):
+    with_it = shaken(y=[0.02, *[common] * 5])["std"].copy(deep=True)
+    with_it.loc[{"motion_channels": "independent"}] = independent
+    with_it.loc[{"motion_level_wavelengths": 0}] = 0.02
+    sweep = xr.concat([shaken(), shaken().assign(std=with_it)], dim="autofocus_method")
+    sweep = sweep.assign_coords(autofocus_method=["none", "echoes"])
+    sweep["autofocus_method"].attrs["long_name"] = "autofocus.method"
+    with_sweep = study.model_copy(update={"sweeps": study.sweeps | {"autofocus": {}}})
+    assert claims.sweeps_of(with_sweep) == ("vibration", "autofocus")
+    # Without errors as recorded the independent ones of this sweep have ten times as much.
+    sweep["std"].loc[{"motion_level_wavelengths": 0}] = 0.02
+    found = verdicts(products | {"sweeps/autofocus": sweep}, with_sweep)
+    assert found["F5-y-measured"].verdict == verdict
+    assert "F5-y-measured" not in verdicts(products, study)
 
 
 def test_claims_read_no_section_but_the_declared(products, study):

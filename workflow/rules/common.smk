@@ -188,5 +188,5 @@ def shown_sweeps():
         for name in figures.FIGURES[figure].sweeps
     }
     if STUDY.outputs.claims:
-        read |= {*claims.SWEEPS}
+        read |= {*claims.sweeps_of(STUDY)}
     return sorted(read)

@@ -48,7 +48,7 @@ rule detection_summary:
 rule claims:
     input:
         **product_files(*claims.INPUTS),
-        **sweep_files(*claims.SWEEPS),
+        **sweep_files(*claims.sweeps_of(STUDY)),
         code=sources_of("paper.claims", script="claims"),
     output:
         json=report(

@@ -45,6 +45,9 @@ INPUTS = (
 SWEEPS = ("vibration",)
 """Sweeps that the claims are decided on; among the products, each is ``sweeps/<name>``."""
 
+AUTOFOCUS = "autofocus"
+"""Sweep that decides whether y must be measured; a claim is made of it where a study has it."""
+
 SECTIONS = ("radar", "scene", "sweeps")
 """Sections of the configuration that the claims read."""
 
@@ -58,6 +61,8 @@ PAPER_STD_M = 0.045
 
 # A spread of this share of the relief's own is no better than a DEM of level ground.
 _FAILED_SHARE = 0.9
+# Growth over the spread without errors that autofocus may leave.
+_KEPT = 1.3
 # Growth that counts as such, beside the scatter of the realizations.
 _GROWTH = 0.1
 
@@ -93,13 +98,18 @@ class Claim:
     figures: dict[str, float]
 
 
+def sweeps_of(study: Study) -> tuple[str, ...]:
+    """Return the sweeps that a study's claims are decided on; section ``sweeps`` is read."""
+    return (*SWEEPS, *({AUTOFOCUS} & study.sweeps.keys()))
+
+
 def evaluate(products: Products, study: Study) -> list[Claim]:
     """Decide every claim of Figs. 2-5 and section 1.2.
 
     Parameters
     ----------
     products
-        The products named in `INPUTS` and the sweeps named in `SWEEPS`.
+        The products named in `INPUTS` and the sweeps that `sweeps_of` names.
     study
         The configuration; the sections in `SECTIONS` are read.
 
@@ -123,6 +133,7 @@ def evaluate(products: Products, study: Study) -> list[Claim]:
         _worst_error(products, study),
         _false_alarms(products, study),
         _most_sensitive(shaken),
+        *([_measured(products)] if AUTOFOCUS in sweeps_of(study) else []),
         _tolerated(shaken),
         _bounded(shaken),
     ]
@@ -621,6 +632,38 @@ def _most_sensitive(shaken: _Shaken) -> Claim:
             "floor_std_m": shaken.floor,
             "relief_std_m": shaken.relief,
         },
+    )
+
+
+def _measured(products: Products) -> Claim:
+    sweep = variables.swept(
+        products[f"sweeps/{AUTOFOCUS}"],
+        "autofocus_method",
+        "motion_channels",
+        "motion_axis",
+        "motion_level_wavelengths",
+    )
+    mean = sweep["std"].sel(region="whole_scene", motion_axis="y").mean("realization")
+    floor = float(mean.sel(autofocus_method="none", motion_level_wavelengths=0).mean())
+    erring = mean.sel(autofocus_method="echoes")
+    erring = erring.sel(motion_level_wavelengths=sweep["motion_level_wavelengths"] > 0)
+    worst = {
+        mode: erring.sel(motion_channels=mode).max().item()
+        for mode in sweep["motion_channels"].values.tolist()
+    }
+    kept = [value <= _KEPT * floor for value in worst.values()]
+    highest = float(sweep["motion_level_wavelengths"].max())
+    words = ", ".join(f"{mode} {100 * value:.1f} cm" for mode, value in worst.items())
+    return Claim(
+        "F5-y-measured",
+        "2.4",
+        "y must be measured to a small part of a wavelength",
+        f"with the errors along y taken from the echoes the std is at most, up to {highest:g} "
+        f"wavelengths: {words}, against {100 * floor:.1f} cm without errors",
+        f"contradicted if autofocus keeps the std at all levels within {_KEPT:g} times that "
+        "without errors, for common and independent errors; partly if for one of them",
+        "contradicted" if all(kept) else "partly" if any(kept) else "reproduced",
+        {"floor_std_m": floor} | {f"{mode}_std_m": value for mode, value in worst.items()},
     )
 
 

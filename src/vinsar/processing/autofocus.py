@@ -63,8 +63,9 @@ _SPACING_STD = 0.05
 # Whole cycles that a position may be off, and from one position to the next.
 _MOST_SLIPS, _MOST_JUMP = 8, 2
 
-# Coherence that neighbours need by their distance alone, and the focus that a result needs.
-_LEAST_COHERENCE, _LEAST_FOCUS = 0.3, 0.6
+# Coherence that neighbours need by their distance alone, the focus that a result needs, and that of
+# recorded positions which the image's steps take on as they are.
+_LEAST_COHERENCE, _LEAST_FOCUS, _IN_FOCUS = 0.3, 0.6, 0.5
 
 # Range margin of the profiles, m: the largest errors of position.
 _MARGIN_M = 0.5
@@ -192,15 +193,18 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
     if gap is not None:
         return _nothing(channels, positions, gap)
     image = _Image(samples)
-    start: Floats = np.zeros((channels, positions, 3))
+    still: Floats = np.zeros((channels, positions, 3))
+    start = still
     before = best = image.energy_of(start)
     # Of all steps the focus after this one alone tells a wrong order of positions from a right one.
-    for other in (samples.along_sight(error), _spaced(samples)):
+    # In focus as recorded, positions need no other start, nor the level ground that these assume.
+    others = samples.along_sight(error), _spaced(samples)
+    for other in others if samples.focus(before, still) < _IN_FOCUS else ():
         energy = image.energy_of(other)
         if energy > _PREFERENCE * best:
             start, best = other, energy
     result = image.refine(start)
-    focus = samples.focus(before, result), samples.focus(result.energy, result)
+    focus = samples.focus(before, still), samples.focus(result.energy, result.displacement)
     std = np.sqrt(np.einsum("clii->cli", result.covariance))
     sight = samples.sight()
     range_std = np.sqrt(np.einsum("cli,clij,clj->cl", sight, result.covariance, sight))
@@ -356,9 +360,9 @@ class _Samples:
         ends = self.transmitter[..., 0] + self.receiver[..., 0]
         return float(self.wavelength / np.ptp(ends))
 
-    def focus(self, energy: float, state: _State) -> float:
+    def focus(self, energy: float, displacement: Floats) -> float:
         """Return the share of the full coherence that an image energy tells."""
-        size = np.abs(self.level_covariance(state.displacement)) ** 2
+        size = np.abs(self.level_covariance(displacement)) ** 2
         size = size.reshape(self.channels, self.positions, self.channels, self.positions)
         own = np.mean([size[c, :, c].sum() for c in range(self.channels)]) / self.positions
         return float(np.clip((energy - 1) / (own - 1), 0, 1))
