@@ -70,6 +70,9 @@ _LEAST_COHERENCE, _LEAST_FOCUS, _IN_FOCUS = 0.3, 0.6, 0.5
 # Range margin of the profiles, m: the largest errors of position.
 _MARGIN_M = 0.5
 
+# Looks times the squared coherence that noise has by chance, exp(-8) of the pairs.
+_BY_CHANCE = 8
+
 # Sectors across the scene and along range; window, in cells, that smooths the topographic phase.
 _ACROSS, _ALONG = 6, 4
 _WINDOW = (9, 3)
@@ -376,6 +379,8 @@ def _gap(samples: _Samples, measured: Floats) -> str | None:
     """
     nearest = np.zeros((2, samples.positions - 1))
     level = np.abs(samples.level_covariance(np.zeros_like(samples.transmitter)))
+    # Of some ten pairs across a gap the largest coherence of noise stays below this, by far.
+    measured = np.where(measured > np.sqrt(_BY_CHANCE / samples.count), measured, 0)
     for row, size in zip(nearest, (level, measured), strict=True):
         pairs = size.reshape(samples.channels, samples.positions, samples.channels, -1)
         for channel in range(samples.channels):
