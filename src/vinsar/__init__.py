@@ -188,8 +188,7 @@ def draw(name: str, products: Mapping[str, xr.Dataset], study: Study) -> matplot
     if name not in figures.FIGURES:
         raise ValueError(f"no figure '{name}'; there are {', '.join(figures.FIGURES)}")
     figure = figures.FIGURES[name]
-    read = [*figure.inputs, *(f"sweeps/{sweep}" for sweep in figure.sweeps)]
-    missing = [product for product in read if product not in products]
+    missing = [product for product in figure.reads if product not in products]
     if missing:
         raise ValueError(f"the figure '{name}' reads {', '.join(missing)}, not given")
-    return figures.shown_inline(figure.draw({key: products[key] for key in read}, study))
+    return figures.shown_inline(figure.draw({key: products[key] for key in figure.reads}, study))

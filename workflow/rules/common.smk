@@ -21,7 +21,7 @@ try:
     STAGES = pipeline.stages(STUDY)
     figures.check(STUDY, {*STAGES, *pipeline.from_files(STUDY)})
     if workflow.is_main_process:
-        # For its faults alone: a file of the user's own is found wanting before anything runs.
+        # For its faults alone: a file that cannot be used is refused before anything runs.
         ingest.read(STUDY)
 except ConfigurationError as error:
     raise WorkflowError(str(error)) from None

@@ -1,4 +1,4 @@
-# Files of the user's own: heights for the terrain, or echoes in place of simulated ones.
+# Files from elsewhere: heights for the terrain, or echoes in place of simulated ones.
 
 if "elevation" in pipeline.from_files(STUDY):
 

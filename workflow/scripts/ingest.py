@@ -1,4 +1,4 @@
-"""Read a file of the user's own and write the products that the chain takes from it."""
+"""Read a measured or surveyed file and write the products that the chain takes from it."""
 
 from pathlib import Path
 

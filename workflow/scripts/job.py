@@ -139,7 +139,7 @@ def read_products(snakemake):
 
 
 def attributes(snakemake, stage):
-    """Say where the rule's output comes from."""
+    """Return the provenance of the rule's output."""
     configuration = dict(snakemake.params.configuration)
     return provenance.describe(
         study=configuration.pop("study"),

@@ -38,7 +38,7 @@ class Progress:
             self.logged = now
 
     def describe(self, done, total, seconds):
-        """Say how many cases are done; how fast and for how long yet, once one is."""
+        """Return how many cases are done and, once one is, their rate and the time left."""
         text = f"{done} of {total} cases"
         if done > self.first and seconds > 0:
             rate = (done - self.first) / seconds

@@ -475,9 +475,8 @@ def _pictures(sources: Sources, *, only: tuple[str, ...] = ()) -> list[Block]:
         if (name in only) != bool(only):
             continue
         figure = FIGURES[name]
-        read = [*figure.inputs, *(f"sweeps/{sweep}" for sweep in figure.sweeps)]
         numbers = ""
-        if figure.numbers is not None and all(key in sources.products for key in read):
+        if figure.numbers is not None and all(key in sources.products for key in figure.reads):
             numbers = figure.numbers(sources.products, sources.study)
         caption = " ".join(figure.caption.replace("``", "`").split())
         png = files[name, ".png"]

@@ -164,8 +164,7 @@ def draw():
 
     def drawn(name, products, study):
         figure = figures.FIGURES[name]
-        read = [*figure.inputs, *(f"sweeps/{key}" for key in figure.sweeps)]
-        allowed = {key: products[key] for key in read}
+        allowed = {key: products[key] for key in figure.reads}
         return figure.draw(allowed, OnlySections(study, figure.sections))
 
     return drawn

@@ -48,3 +48,8 @@ class Figure:
     sweeps: tuple[str, ...] = ()
     numbers: Callable[[Products, Study], str] | None = None
     sheet: str = ""
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """All that it reads, under the names by which `draw` finds it among the products."""
+        return (*self.inputs, *(f"sweeps/{name}" for name in self.sweeps))

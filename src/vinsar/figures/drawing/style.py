@@ -130,29 +130,22 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
 
     The study is the function's last argument.
     """
-
-    @functools.wraps(draw)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
-        study: Any = kwargs.get("study", args[-1] if args else None)
-        with applied(study.figures):
-            return draw(*args, **kwargs)
-
-    return wrapper
+    return _styled(draw, {})
 
 
 def styled_for_slides(font_size_pt: float) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Make a function draw in the style with text of a size of its own, for slides."""
+    return functools.partial(_styled, changes={"font_size_pt": font_size_pt})
 
-    def decorate(draw: Callable[P, R]) -> Callable[P, R]:
-        @functools.wraps(draw)
-        def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
-            study: Any = kwargs.get("study", args[-1] if args else None)
-            with applied(study.figures.model_copy(update={"font_size_pt": font_size_pt})):
-                return draw(*args, **kwargs)
 
-        return wrapper
+def _styled(draw: Callable[P, R], changes: dict[str, Any]) -> Callable[P, R]:
+    @functools.wraps(draw)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+        study: Any = kwargs.get("study", args[-1] if args else None)
+        with applied(study.figures.model_copy(update=changes)):
+            return draw(*args, **kwargs)
 
-    return decorate
+    return wrapper
 
 
 def new_figure(width_mm: float, height_mm: float) -> Figure:
