@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+import vinsar
 from vinsar import figures
 from vinsar.evaluation import accuracy
 from vinsar.paper import claims
@@ -40,7 +41,7 @@ def products(study):
 @pytest.fixture(scope="module")
 def sweeps(checkout, study):
     return {
-        f"sweeps/{name}": storage.read(checkout.results / f"sweeps/{name}.nc", "sweep")
+        f"sweeps/{name}": vinsar.read(checkout.results / f"sweeps/{name}.nc")
         for figure in study.outputs.figures
         for name in figures.FIGURES[figure].sweeps
     }
