@@ -8,9 +8,10 @@ from pathlib import Path
 import dask
 import numpy as np
 
+import vinsar
 from vinsar.foundations import blocks
 from vinsar.foundations.configuration import Study
-from vinsar.study import pipeline, validation
+from vinsar.study import pipeline
 
 ROOT = Path(__file__).parents[1]
 FRAME = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
@@ -18,7 +19,7 @@ FRAME = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
 
 def study(*, coarse):
     """Return the paper's study, on its grid of 2 cm or on the variant's of 5 cm."""
-    paper = validation.load(ROOT / "config/paper.yaml")
+    paper = vinsar.load()
     if not coarse:
         return paper
     override = paper.variants["grid of 5 cm"]

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+import vinsar
+
 ROOT = Path(__file__).parents[1]
 
 # What grows along each axis, from small to large; all else is the paper's.
@@ -79,9 +81,9 @@ def large_scene(small):
     20 m x 40 m at 2 cm with facets of 3 cm, 161 positions and 801 frequencies.
     """
     from vinsar.foundations import blocks
-    from vinsar.study import pipeline, validation
+    from vinsar.study import pipeline
 
-    paper = validation.load(ROOT / "config/paper.yaml")
+    paper = vinsar.load()
     ground = {"x_min_m": -10.0, "x_max_m": 10.0, "y_min_m": 10.0, "y_max_m": 50.0}
     changes = {
         "radar": {"aperture_length_m": 1.6, "frequency_count": 801},

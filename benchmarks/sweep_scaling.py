@@ -11,7 +11,7 @@ import argparse
 import time
 from pathlib import Path
 
-from vinsar.study import validation
+import vinsar
 from vinsar.sweeps import cluster, sweep
 
 ROOT = Path(__file__).parents[1]
@@ -53,7 +53,7 @@ def main():
     parser.add_argument("--realizations", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
-    study = validation.load(ROOT / "config/paper.yaml")
+    study = vinsar.load()
     part = study.sweeps["vibration"].model_copy(update={"realizations": arguments.realizations})
     fastest = dict.fromkeys(KINDS, float("inf"))
     for number in range(arguments.rounds):

@@ -6,12 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
+import vinsar
 from vinsar import measure, results
 from vinsar.foundations import text
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
 from vinsar.results import export, lineage, reproduction, workflow
-from vinsar.study import ingest
 
 
 def _say(what: str) -> None:
@@ -24,12 +24,11 @@ def _say(what: str) -> None:
 def _study(name: str, files: list[str]) -> Study | None:
     """Return the configuration as it is now, or nothing where it is not known."""
     own = Path("config") / f"{name}.yaml"
-    paths = [Path("config/paper.yaml"), *([own] if own.stem != "paper" else [])]
     if files:
-        return ingest.load(paths[0], *files)
-    if not all(path.is_file() for path in paths):
+        return vinsar.load(*files)
+    if not own.is_file():
         return None
-    return ingest.load(*paths)
+    return vinsar.load(own)
 
 
 def _trace(arguments: argparse.Namespace) -> int:
@@ -66,7 +65,7 @@ def _diff(arguments: argparse.Namespace) -> int:
 
 
 def _design(arguments: argparse.Namespace) -> int:
-    study = ingest.load("config/paper.yaml", *arguments.configfile)
+    study = vinsar.load(*arguments.configfile)
     _say(design.as_markdown(design.Sheet(study)))
     # The workflow keeps the sheet and draws it.
     workflow.make(["design", "figure_design"], arguments.configfile)

@@ -15,7 +15,7 @@ import xarray as xr
 sys.path.insert(0, str(Path(__file__).parent))
 import slurm
 
-from vinsar.study import validation
+import vinsar
 from vinsar.study.options import Dask, Sweep
 from vinsar.sweeps import cluster, sweep
 
@@ -118,7 +118,7 @@ def test_a_job_that_fails_shows_its_log(checkout, environment):
 def test_a_sweep_on_dask_jobqueue_has_the_bits_of_one_thread(environment, tmp_path, monkeypatch):
     from dask_jobqueue import SLURMCluster
 
-    tiny = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    tiny = vinsar.load(ROOT / "tests/workflow/tiny.yaml")
     over = {"motion.level_wavelengths": [0.0, 0.1], "filtering.goldstein_alpha": [0.3, 0.8]}
     quick = Sweep.model_validate({"over": over, "realizations": 2, "base": {}})
     study = tiny.model_copy(update={"sweeps": {"quick": quick}})

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import fresnel
 
+import vinsar
 from vinsar.foundations import variables
 from vinsar.processing import focusing, leakage
 from vinsar.radar import trajectory, waveform
@@ -118,7 +119,7 @@ def test_a_switched_array_s_coupling_is_not_common_to_its_positions(rail):
 def shown():
     """What the coupling's study shows, on a small scene."""
     raw = validation.merge(
-        validation.load(CONFIG / "paper.yaml", CONFIG / "smoke.yaml").model_dump(mode="json"),
+        vinsar.load(CONFIG / "smoke.yaml").model_dump(mode="json"),
         {"echo": {"coupling_db": 60.0, "accuracy_db": -85.0}, "variants": {}, "sweeps": {}},
     )
     return pipeline.run(validation.check(raw), only="coupling")["coupling"]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.prediction import design
 from vinsar.processing import filtering, focusing
 from vinsar.radar import aperture, trajectory, waveform
@@ -38,7 +39,7 @@ def test_a_displaced_antenna_moves_the_height_of_a_point_target_as_predicted(
     flat = aperture.flat_earth_phase(lower, upper, x, y, WAVELENGTH)
     phase = flat + np.angle(images[0] * images[1].conj())
     *_, height = aperture.locate(lower, upper, x, y, phase, WAVELENGTH)
-    sheet = design.Sheet(validation.load(CONFIG / "paper.yaml"))
+    sheet = design.Sheet(vinsar.load())
     expected = offset_m * float(sheet.height_per_offset(x, y, np.eye(3)[axis]))
     # Interpolation errs by 1e-3 of the amplitude, a milliradian: 0.1 mm; the second order of the
     # offset is offset / B of the error.
@@ -48,7 +49,7 @@ def test_a_displaced_antenna_moves_the_height_of_a_point_target_as_predicted(
 def run(**changes):
     """A small scene of gentle relief, without shadow."""
     raw = validation.merge(
-        validation.load(CONFIG / "paper.yaml", CONFIG / "smoke.yaml").model_dump(mode="json"),
+        vinsar.load(CONFIG / "smoke.yaml").model_dump(mode="json"),
         {
             "variants": {},
             "sweeps": {},
@@ -64,7 +65,7 @@ def run(**changes):
 @pytest.fixture(scope="module", params=[None, 10.0, 0.0], ids=lambda snr: f"{snr} dB")
 def level_ground(request):
     """Interferogram of level ground as wide and deep as the paper's scene, and its sheet."""
-    raw = validation.load(CONFIG / "paper.yaml").model_dump(mode="json")
+    raw = vinsar.load().model_dump(mode="json")
     changes = {
         "variants": {},
         "sweeps": {},
@@ -122,7 +123,7 @@ def test_the_phase_of_level_ground_is_as_noisy_as_predicted(level_ground, option
 
 @pytest.mark.parametrize("beta", [60.0, 90.0])
 def test_errors_of_both_channels_turn_the_phase_of_level_ground_as_predicted(beta):
-    raw = validation.load(CONFIG / "paper.yaml").model_dump(mode="json")
+    raw = vinsar.load().model_dump(mode="json")
     sheet = design.Sheet(validation.check(
         validation.merge(raw, {"radar": {"baseline_angle_deg": beta}, "variants": {}, "sweeps": {}})
     ))  # fmt: skip

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.evaluation import misregistration
 from vinsar.processing import focusing
 from vinsar.radar import aperture, motion, trajectory, waveform
 from vinsar.simulation import echo
-from vinsar.study import validation
 
 PAPER = Path(__file__).parents[2] / "config/paper.yaml"
 LIGHT = 299_792_458.0
@@ -131,7 +131,7 @@ def test_the_height_of_a_raised_target_is_inverted_from_its_image(
 @pytest.mark.parametrize("system", ["transmit_pair", "receive_pair"])
 @pytest.mark.parametrize("target", [(0.0, 13.0, 0.3), (-2.0, 11.0, -0.2)])
 def test_a_switched_array_on_a_moving_vehicle_inverts_the_height(image, system, target):
-    paper = validation.load(PAPER).radar
+    paper = vinsar.load().radar
     antennas = motion.advance(
         trajectory.planned(paper.model_copy(update={"system": system})),
         speed_m_per_s=10.0,

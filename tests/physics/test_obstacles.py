@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.processing import detection
 from vinsar.radar import formulas, geometry
 from vinsar.study import pipeline, validation
@@ -16,7 +17,7 @@ AT = (0.4, 11.2)
 
 @pytest.fixture(scope="module")
 def study():
-    raw = validation.load(ROOT / "config/paper.yaml").model_dump(mode="json")
+    raw = vinsar.load().model_dump(mode="json")
     box = {"shape": "box", "x_m": AT[0], "y_m": AT[1], "size_x_m": 0.5, "size_y_m": 0.5}
     patch = {"x_m": -0.6, "y_m": 11.4, "size_x_m": 0.5, "size_y_m": 0.5, "reflectivity": 2.0}
     extent = {"x_min_m": -1.2, "x_max_m": 1.2, "y_min_m": 10.0, "y_max_m": 13.0}

@@ -1,14 +1,13 @@
 """Errors of the baseline against Eqs. 5 and 12."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.evaluation import baseline_errors
 from vinsar.foundations import variables
 from vinsar.radar import formulas, geometry
-from vinsar.study import pipeline, validation
+from vinsar.study import pipeline
 
 BASELINE_M = 0.3
 LENGTH_STD_M = 1e-5
@@ -112,7 +111,7 @@ def test_the_same_seed_gives_the_same_draws_and_another_gives_others(drawn):
     ("system", "height"), [("rail", 2.0), ("transmit_pair", 2.1), ("receive_pair", 2.0)]
 )
 def test_the_stage_takes_the_antennas_that_the_baseline_separates(system, height):
-    study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
+    study = vinsar.load()
     radar = study.radar.model_copy(update={"system": system, "transmitter_height_m": 2.1})
     found = pipeline.run_stage("baseline_angle", {}, study.model_copy(update={"radar": radar}))
     antenna = np.array([0.0, 0.0, height])

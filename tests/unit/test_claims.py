@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import vinsar
 from vinsar.paper import claims
 from vinsar.processing import detection
-from vinsar.study import pipeline, validation
+from vinsar.study import pipeline
 from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
 ROOT = Path(__file__).parents[2]
@@ -15,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def study():
-    return validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    return vinsar.load(ROOT / "tests/workflow/tiny.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import psutil
 import pytest
 import xarray as xr
 
-from vinsar.study import validation
+import vinsar
 from vinsar.study.options import Dask, Sweep
 from vinsar.sweeps import cluster, sweep
 from vinsar.sweeps import processes as processes_module
@@ -24,7 +24,7 @@ OVER = {"motion.level_wavelengths": [0.0, 0.1, 0.2], "filtering.goldstein_alpha"
 
 @pytest.fixture(scope="module")
 def study():
-    tiny = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    tiny = vinsar.load(ROOT / "tests/workflow/tiny.yaml")
     quick = Sweep.model_validate({"over": OVER, "realizations": 3, "base": {}})
     return tiny.model_copy(update={"sweeps": {"quick": quick}})
 

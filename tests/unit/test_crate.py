@@ -5,8 +5,8 @@ from pathlib import Path
 import netCDF4
 import pytest
 
+import vinsar
 from vinsar.results import crate, lineage, provenance
-from vinsar.study import validation
 
 ROOT = Path(__file__).parents[2]
 
@@ -55,7 +55,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def study():
-    whole = validation.load(ROOT / "config/paper.yaml")
+    whole = vinsar.load()
     outputs = whole.outputs.model_copy(update={"figures": (), "claims": False})
     return whole.model_copy(update={"study": "small", "outputs": outputs})
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import spence
 
+import vinsar
 from vinsar.evaluation import baseline_errors
 from vinsar.foundations.configuration import Study
 from vinsar.prediction import design
@@ -20,7 +21,7 @@ WAVELENGTH = 299_792_458.0 / 14e9
 ENDS = ("transmitter", "receiver")
 BOX = {"shape": "box", "x_m": 0.0, "y_m": 13.0, "size_x_m": 0.4, "size_y_m": 0.4}
 PIT = {"shape": "pit", "x_m": 1.0, "y_m": 13.0, "diameter_m": 0.6, "depth_m": 0.4}
-PAPER = validation.load(CONFIG / "paper.yaml")
+PAPER = vinsar.load()
 
 
 def study_with(**sections: dict[str, Any]) -> Study:
@@ -260,7 +261,7 @@ def test_suppression_ends_the_warning_of_the_coupling():
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_shipped_study_has_a_sheet(path):
-    study = validation.load(CONFIG / "paper.yaml", path)
+    study = vinsar.load(path)
     text = design.as_markdown(design.Sheet(study))
     assert text.startswith(f"# Design of the study {study.study}\n")
     assert "nan" not in text

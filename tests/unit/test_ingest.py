@@ -10,6 +10,7 @@ import pytest
 import rasterio
 import xarray as xr
 
+import vinsar
 from vinsar import figures
 from vinsar.foundations.configuration import Study
 from vinsar.foundations.errors import ConfigurationError
@@ -616,4 +617,4 @@ def test_what_a_file_gives_must_be_given(terrain_file, echo_file):
 
 def test_nothing_is_read_for_a_simulated_study(study):
     assert ingest.read(study) == {}
-    assert isinstance(ingest.load(*FILES), Study)
+    assert isinstance(vinsar.load(*FILES), Study)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.figures import acquisition
 from vinsar.prediction import design
 from vinsar.radar import formulas, geometry, instrument
@@ -16,7 +15,7 @@ from vinsar.study import validation
 
 LIGHT = 299_792_458.0
 WAVELENGTH = LIGHT / 14e9
-STUDY = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
+STUDY = vinsar.load()
 SYSTEMS = ("rail", "transmit_pair", "receive_pair")
 
 

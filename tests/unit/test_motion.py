@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.special import fresnel
 
+import vinsar
 from vinsar.foundations import variables
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.prediction import design
@@ -409,7 +410,7 @@ def test_the_margin_of_the_profiles_covers_the_errors_or_says_so(rail):
 def test_an_array_on_a_moving_vehicle_drives_as_long_as_it_dwells_on_its_samples():
     study = validation.check(
         validation.merge(
-            validation.load(CONFIG / "paper.yaml").model_dump(mode="json"),
+            vinsar.load().model_dump(mode="json"),
             {
                 "radar": {"system": "transmit_pair", "dwell_s": 1e-6},
                 "vehicle": {"forward_speed_m_per_s": 5.0, "scan_duration_s": 0.5},

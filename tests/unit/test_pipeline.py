@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import vinsar
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import Study
 from vinsar.processing import interferogram
 from vinsar.processing.height import ControlPoint
-from vinsar.study import pipeline, validation
+from vinsar.study import pipeline
 
 ROOT = Path(__file__).parents[2]
 PROCESSING = ("autofocus", "profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
@@ -18,7 +19,7 @@ PROCESSING = ("autofocus", "profiles", "images", "interferogram", "filtered", "u
 
 @pytest.fixture(scope="module")
 def study():
-    return validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    return vinsar.load(ROOT / "tests/workflow/tiny.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import vinsar
 from vinsar.foundations import variables
 from vinsar.foundations.errors import ConfigurationError
 from vinsar.results import storage
 from vinsar.simulation.scene import Scene
-from vinsar.study import pipeline, validation
+from vinsar.study import pipeline
 from vinsar.study.composition import StudyModel
 from vinsar.study.options import Sweep
 from vinsar.sweeps import sweep
@@ -21,7 +22,7 @@ STATISTICS = {name for name in SWEEP if SWEEP[name].dims == ("region",)}
 
 @pytest.fixture(scope="module")
 def tiny():
-    return validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    return vinsar.load(ROOT / "tests/workflow/tiny.yaml")
 
 
 @pytest.fixture(autouse=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.prediction import systems
-from vinsar.study import validation
 from vinsar.study.options import Sweep
 from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
@@ -17,7 +17,7 @@ CONFIG = Path(__file__).parents[2] / "config"
 
 @pytest.fixture(scope="module")
 def study():
-    return validation.load(CONFIG / "paper.yaml", CONFIG / "array.yaml")
+    return vinsar.load(CONFIG / "array.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
+import vinsar
 from vinsar.foundations import constants
 from vinsar.radar import trajectory
-from vinsar.study import validation
 
 
 def make(angle_deg, **changes):
@@ -87,7 +85,7 @@ def test_an_array_has_one_end_that_stands_still(between):
 
 @pytest.mark.parametrize("system", ["rail", "transmit_pair", "receive_pair"])
 def test_the_configuration_names_the_arrangement(system):
-    study = validation.load(Path(__file__).parents[2] / "config/paper.yaml")
+    study = vinsar.load()
     lower, upper = trajectory.apertures(
         trajectory.planned(study.radar.model_copy(update={"system": system}))
     )
@@ -128,9 +126,7 @@ def test_range_extent_encloses_every_range_and_no_more(rail, left, right, near, 
 
 @pytest.mark.parametrize("system", ["rail", "transmit_pair", "receive_pair"])
 def test_further_antennas_stand_between_the_lower_and_the_upper_one(system):
-    section = validation.load(Path(__file__).parents[2] / "config/paper.yaml").radar.model_copy(
-        update={"system": system}
-    )
+    section = vinsar.load().radar.model_copy(update={"system": system})
     two = trajectory.planned(section)
     three = trajectory.planned(section.model_copy(update={"baselines_m": (0.06, 0.3)}))
     assert list(three["channel"].values) == ["lower", "middle", "upper"]

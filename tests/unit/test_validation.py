@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+import vinsar
 from vinsar.foundations.errors import ConfigurationError
 from vinsar.study import validation, work
 
@@ -48,7 +49,7 @@ def faults(raw) -> dict[str, str]:
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_shipped_study_is_valid(path):
-    assert validation.load(CONFIG / "paper.yaml", path).study == path.stem
+    assert vinsar.load(path).study == path.stem
 
 
 @pytest.mark.parametrize(
@@ -395,7 +396,7 @@ def test_files_override_in_order(tmp_path):
     first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
     first.write_text("seed: 1\nradar: {baseline_m: 0.4, rail_height_m: 2.5}\n")
     second.write_text("study: second\nradar: {baseline_m: 0.5}\n")
-    study = validation.load(CONFIG / "paper.yaml", first, second)
+    study = vinsar.load(first, second)
     assert (study.seed, study.radar.baseline_m, study.radar.rail_height_m) == (1, 0.5, 2.5)
     assert study.radar.aperture_length_m == 0.8
 
@@ -405,12 +406,12 @@ def test_a_file_that_is_no_configuration_is_named(tmp_path, content):
     path = tmp_path / "broken.yaml"
     path.write_text(content)
     with pytest.raises(ValueError, match=r"broken\.yaml"):
-        validation.load(path)
+        vinsar.load(path)
 
 
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"absent\.yaml"):
-        validation.load(tmp_path / "absent.yaml")
+        vinsar.load(tmp_path / "absent.yaml")
 
 
 def test_variants_are_checked_as_studies_all_at_once():

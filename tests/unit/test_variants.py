@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from vinsar.study import pipeline, validation
+import vinsar
+from vinsar.study import pipeline
 from vinsar.sweeps import variants
 
 ROOT = Path(__file__).parents[2]
@@ -11,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def study():
-    tiny = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    tiny = vinsar.load(ROOT / "tests/workflow/tiny.yaml")
     return tiny.model_copy(update={"variants": {"other seed": {"seed": 1}}})
 
 

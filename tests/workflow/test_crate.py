@@ -13,8 +13,8 @@ import requests_cache
 import rocrate
 from urllib3 import HTTPResponse
 
+import vinsar
 from vinsar.results import lineage, provenance
-from vinsar.study import validation
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ("--configfile", "tiny.yaml")
@@ -177,8 +177,8 @@ def test_the_sources_are_those_that_ran(crate, entities):
 
 def test_the_crate_s_configuration_is_the_study_s(crate):
     defaults = crate / "source/config/paper.yaml"
-    study = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
-    assert validation.load(defaults, crate / "configuration.yaml") == study
+    study = vinsar.load(ROOT / "tests/workflow/tiny.yaml")
+    assert vinsar.load(defaults, crate / "configuration.yaml") == study
 
 
 def test_the_archive_is_the_folder_and_the_same_bytes_again(crate, lasting_copy):

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+import vinsar
 from vinsar.prediction import design
-from vinsar.study import validation
 
 ROOT = Path(__file__).parents[2]
 
@@ -12,7 +12,7 @@ def test_the_design_sheet_is_printed_kept_and_drawn_without_running_the_study(ne
     made = new_checkout()
     done = made.ask("design", "--configfile", "tiny.yaml")
     assert done.returncode == 0, done.stdout + done.stderr
-    study = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    study = vinsar.load(ROOT / "tests/workflow/tiny.yaml")
     sheet = design.as_markdown(design.Sheet(study))
     assert done.stdout.startswith(sheet)
     assert (made.results / "design.md").read_text() == sheet

@@ -14,7 +14,7 @@ from vinsar import figures
 from vinsar.evaluation import accuracy
 from vinsar.paper import claims
 from vinsar.results import storage
-from vinsar.study import pipeline, validation
+from vinsar.study import pipeline
 
 ROOT = Path(__file__).parents[2]
 OF_SWEEPS = {"figure_fig5", "figure_snr"}
@@ -30,7 +30,7 @@ AFTER_FILTERING = {
 
 @pytest.fixture(scope="module")
 def study():
-    return validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    return vinsar.load(ROOT / "tests/workflow/tiny.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+import vinsar
 from vinsar.study import pipeline, validation
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +39,7 @@ def test_arrays_come_to_heights_and_stand_beside_the_rail(new_checkout):
     cycles = [float(row[3].split()[0]) for row in rows[2:]]
     assert cycles[1:] == pytest.approx([2 * cycles[0]] * 2, rel=0.01)
     # The transmit pair is the study itself.
-    base = validation.load(ROOT / "config/paper.yaml", ROOT / "tests/workflow/tiny.yaml")
+    base = vinsar.load(ROOT / "tests/workflow/tiny.yaml")
     study = validation.check(validation.merge(base.model_dump(mode="json"), yaml.safe_load(ARRAY)))
     accuracy = pipeline.run(study, only="accuracy")["accuracy"].sel(region="visible_ground")
     assert rows[3][-1] == f"{100 * float(accuracy['std']):.2f} cm |"

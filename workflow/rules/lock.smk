@@ -9,8 +9,8 @@ from vinsar import results
 
 def drop_stale_locks(study):
     """Drop the locks that name results of a study that nobody runs; return what says that we do."""
-    Path(".snakemake/running").mkdir(parents=True, exist_ok=True)
-    running = open(f".snakemake/running/{study}", "w")
+    Path(".snakemake/studies").mkdir(parents=True, exist_ok=True)
+    running = open(f".snakemake/studies/{study}", "w")
     own = f"{results.folder(study).as_posix()}/"
     try:
         fcntl.flock(running, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -54,27 +54,6 @@ _ORDERED = 0.9
 _OFF_ORIGIN_M = 1.0
 
 
-def load(*paths: str | Path) -> Study:
-    """Read configuration files as `validation.load` does, with what a measurement adds to them.
-
-    Parameters
-    ----------
-    paths
-        YAML files; the first is usually ``config/paper.yaml``, which has every key.
-
-    Returns
-    -------
-    Study
-        The checked configuration.
-
-    Raises
-    ------
-    validation.ConfigurationError
-        If anything is wrong with it or with the file that it names.
-    """
-    return check(validation.read(*paths))
-
-
 def check(raw: Mapping[str, Any]) -> Study:
     """Check a configuration; a measurement's file takes the place of the section ``radar``.
 

@@ -63,29 +63,6 @@ def read(*paths: str | Path) -> dict[str, Any]:
     return merged
 
 
-def load(*paths: str | Path) -> Study:
-    """Read configuration files, each overriding the ones before it, and check the result.
-
-    Parameters
-    ----------
-    paths
-        YAML files, as in `read`.
-
-    Returns
-    -------
-    Study
-        The checked configuration.
-
-    Raises
-    ------
-    ConfigurationError
-        If anything is wrong with it.
-    ValueError
-        If a file cannot be read (`strict_yaml.load`), or none names the study.
-    """
-    return check(read(*paths))
-
-
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return a configuration with some keys changed, section by section; lists are replaced."""
     result = dict(base)
