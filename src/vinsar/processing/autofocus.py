@@ -65,7 +65,7 @@ _MOST_SLIPS, _MOST_JUMP = 8, 2
 
 # Coherence that neighbours need by their distance alone, the focus that a result needs, and that of
 # recorded positions which the image's steps take on as they are.
-_LEAST_COHERENCE, _LEAST_FOCUS, _IN_FOCUS = 0.3, 0.6, 0.5
+_LEAST_COHERENCE, _LEAST_FOCUS, _IN_FOCUS = 0.3, 0.75, 0.5
 
 # Range margin of the profiles, m: the largest errors of position.
 _MARGIN_M = 0.5
