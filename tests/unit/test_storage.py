@@ -1,5 +1,6 @@
 import resource
 import signal
+from contextlib import contextmanager
 
 import netCDF4
 import numpy as np
@@ -165,15 +166,18 @@ def test_a_map_without_a_detection_comes_back(tmp_path):
     xr.testing.assert_identical(back.drop_attrs(deep=False), found)
 
 
-@pytest.fixture
-def _small_files():
+@contextmanager
+def small_files():
     """Let no file grow beyond some bytes, which fails in the middle of writing."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    signal.signal(signal.SIGXFSZ, handler)
+    try:
+        yield
+    finally:
+        # Before pytest writes its next dot, which may go to a longer file.
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
 
 
 def as_text(path):
@@ -185,12 +189,11 @@ def as_netcdf(path):
     storage.write(images(), path, "images")
 
 
-@pytest.mark.usefixtures("_small_files")
 @pytest.mark.parametrize("write", [as_text, as_netcdf])
 def test_what_cannot_be_written_whole_is_told_with_its_name(tmp_path, write):
     path = tmp_path / "a.nc"
     path.write_bytes(b"before")
-    with pytest.raises(OSError, match=r"^cannot write .*/a\.nc: "):
+    with small_files(), pytest.raises(OSError, match=r"^cannot write .*/a\.nc: "):
         write(path)
     assert path.read_bytes() == b"before"
     assert [one.name for one in tmp_path.iterdir()] == ["a.nc"]

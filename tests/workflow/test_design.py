@@ -23,7 +23,7 @@ def test_the_design_sheet_is_printed_kept_and_drawn_without_running_the_study(ne
 
 def test_a_wrong_configuration_has_no_sheet(new_checkout):
     made = new_checkout()
-    (made.folder / "wrong.yaml").write_text("radar: {baseline_m: -1.0}\n")
+    (made.folder / "wrong.yaml").write_text("study: wrong\nradar: {baseline_m: -1.0}\n")
     done = made.ask("design", "--configfile", "wrong.yaml")
     assert done.returncode == 2
     assert "radar.baseline_m = -1.0" in done.stderr

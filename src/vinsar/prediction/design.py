@@ -705,11 +705,6 @@ class Sheet:
                 "unwrap wrongly"
             )
         found += self._ambiguous_objects()
-        if np.isinf(self.shadow_length(y)).any():
-            found.append(
-                f"radar.rail_height_m = {self.study.radar.rail_height_m}: an obstacle as high as "
-                "the relief hides all that lies behind it"
-            )
         return found
 
     def _ambiguous_objects(self) -> list[str]:
