@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vinsar.foundations.constants import REGIONS
 from vinsar.paper import likeness
 from vinsar.sweeps.sweep import SWEEP, sweep_dataset
 
@@ -20,11 +21,11 @@ def made(keys, logs, realizations=10, seed=0):
     beyond, std, worst = np.exp(np.moveaxis(drawn, -1, 0))
     data = {}
     for name, variable in SWEEP.items():
-        sizes = {"region": 3, "channel": 2, "ground_axis": 2}
+        sizes = {"region": len(REGIONS), "channel": 2, "ground_axis": 2}
         own = tuple(sizes[dim] for dim in variable.dims)
         data[name] = np.ones((*shape, realizations, *own), int if name == "residues" else float)
     for name, values in zip(likeness.STATISTICS, (1 - beyond, std, worst), strict=True):
-        data[name] = np.repeat(values[..., None], 3, axis=-1)
+        data[name] = np.repeat(values[..., None], len(REGIONS), axis=-1)
     return sweep_dataset(data, keys)
 
 
