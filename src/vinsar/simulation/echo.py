@@ -19,6 +19,7 @@ from vinsar.foundations.randomness import Draw
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
 from vinsar.radar import trajectory, waveform
+from vinsar.radar.trajectory import ANTENNAS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,6 +56,7 @@ ECHO = {
 
 variables.declare("echo", ECHO)
 variables.declare("received", ECHO)
+variables.declare("measurement", ECHO | ANTENNAS)
 
 
 def amplitudes(facets: xr.Dataset, reflectivity: Weighting) -> NDArray[np.floating]:

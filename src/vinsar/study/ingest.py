@@ -17,10 +17,8 @@ from vinsar.foundations import variables
 from vinsar.foundations.constants import AXES, channel_names
 from vinsar.foundations.errors import ConfigurationError, Fault
 from vinsar.radar import geometry, grid, trajectory, waveform
-from vinsar.radar.trajectory import ANTENNAS
 from vinsar.readers import elevation as surveyed
 from vinsar.simulation import scene
-from vinsar.simulation.echo import ECHO
 from vinsar.study import validation
 
 if TYPE_CHECKING:
@@ -37,8 +35,6 @@ if TYPE_CHECKING:
     Antennas = tuple[Floats, Floats]
 
 logger = logging.getLogger(__name__)
-
-variables.declare("measurement", ECHO | ANTENNAS)
 
 _HERTZ = ("Hz", "hertz", "Hertz", "s-1", "1/s")
 
