@@ -111,6 +111,8 @@ def running(folder: Path, cpus: int) -> Iterator[dict[str, str]]:
                 daemon.wait(20)
             except subprocess.TimeoutExpired:
                 daemon.kill()
+                # Not awaited, it would stay in the list of processes, where other tests meet it.
+                daemon.wait()
 
 
 def _idle(environment: dict[str, str]) -> bool:

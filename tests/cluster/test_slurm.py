@@ -30,9 +30,6 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-_UNSEEN = pytest.mark.skip(reason="takes minutes, and has not been seen to pass as a whole yet")
-
-
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory):
     """The environment in which commands find SLURM."""
@@ -53,15 +50,15 @@ def checkout(tmp_path_factory):
 
 
 def started(checkout, environment, *arguments):
-    out = (checkout / "out.txt").open("wb")
-    return subprocess.Popen(
-        [sys.executable, "-P", "workflow/start.py", "--workflow-profile", "profiles/slurm",
-         "--configfile", "config/smoke.yaml", "--nocolor", *arguments],
-        cwd=checkout,
-        env=environment | {"PYTHONPATH": str(checkout / "src")},
-        stdout=out,
-        stderr=subprocess.STDOUT,
-    )  # fmt: skip
+    with (checkout / "out.txt").open("wb") as out:
+        return subprocess.Popen(
+            [sys.executable, "-P", "workflow/start.py", "--workflow-profile", "profiles/slurm",
+             "--configfile", "config/smoke.yaml", "--nocolor", *arguments],
+            cwd=checkout,
+            env=environment | {"PYTHONPATH": str(checkout / "src")},
+            stdout=out,
+            stderr=subprocess.STDOUT,
+        )  # fmt: skip
 
 
 def said(checkout):
@@ -76,7 +73,6 @@ def jobs(environment, state):
     return done.stdout.split()
 
 
-@_UNSEEN
 def test_the_smoke_study_runs_to_its_end_though_a_job_is_killed(checkout, environment):
     process = started(checkout, environment)
     victim = None
@@ -101,7 +97,6 @@ def test_the_smoke_study_runs_to_its_end_though_a_job_is_killed(checkout, enviro
     assert f"threads: {CORES}" in said(checkout)
 
 
-@_UNSEEN
 def test_a_job_that_fails_shows_its_log(checkout, environment):
     broken = checkout / "results/smoke/terrain.nc"
     if not broken.exists():

@@ -21,6 +21,7 @@ study = vinsar.load(
     radar={"frequency_count": 201, "position_spacing_m": 0.02},
     scene=small | {"terrain_spacing_m": 0.02},
     imaging=small | {"grid_spacing_m": 0.04},
+    filtering={"goldstein_patch_px": 32, "goldstein_step_px": 8},
     height={"level_ground": [ground]},
 )
 products = vinsar.run(study, "accuracy")
