@@ -144,8 +144,8 @@ def parser() -> argparse.ArgumentParser:
     packed.set_defaults(answer=_crate)
     sheet = commands.add_parser("design", help="what a configuration will do, without running it")
     sheet.set_defaults(answer=_design)
-    for parser_ in (trace, verify, again, packed, sheet):
-        parser_.add_argument(
+    for subparser in (trace, verify, again, packed, sheet):
+        subparser.add_argument(
             "--configfile",
             nargs="+",
             default=[],

@@ -75,7 +75,7 @@ def test_straight_ahead_a_quarter_of_the_amplitude_goes(rail):
 @pytest.mark.parametrize(("x", "y"), PLACES)
 def test_the_gate_costs_a_target_of_the_scene_next_to_nothing(rail, scatterers, x, y):
     found = image_of(scatterers([x, y, 0.0]), rail, x, y, "gate")
-    # What the gate's edge leaks at 120 cells and more, as in test_suppression: below 1 %.
+    # What the gate's edge leaks at 120 cells and more, as in test_leakage: below 1 %.
     assert np.abs(found - 1).max() < 0.01
 
 

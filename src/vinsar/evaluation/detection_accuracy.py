@@ -147,7 +147,8 @@ def evaluate(
             for sign, mask in zip(signs, grown, strict=True)
         ]
         false = sum(
-            number - np.unique(map_[anywhere & (map_ > 0)]).size for map_, number in areas.values()
+            number - np.unique(labelled[anywhere & (labelled > 0)]).size
+            for labelled, number in areas.values()
         )
         return found, false
 

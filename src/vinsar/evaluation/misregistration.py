@@ -242,16 +242,16 @@ def analyze(
 
 
 def _radial_shift(
-    aperture_: aperture.Aperture, x: Floats, y: Floats, height: Floats
+    synthetic: aperture.Aperture, x: Floats, y: Floats, height: Floats
 ) -> tuple[Floats, Floats]:
-    center = aperture_.center
+    center = synthetic.center
     return formulas.radial_shift(x - center[0], y - center[1], height, float(center[2]))
 
 
 def _equal_path_shift(
-    aperture_: aperture.Aperture, x: Floats, y: Floats, height: Floats
+    synthetic: aperture.Aperture, x: Floats, y: Floats, height: Floats
 ) -> tuple[Floats, Floats]:
-    image_x, image_y = aperture.image_position(aperture_, x, y, height)
+    image_x, image_y = aperture.image_position(synthetic, x, y, height)
     return image_x - x, image_y - y
 
 

@@ -248,9 +248,9 @@ def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: Study) -> 
                     [
                         predicted_std(
                             products["terrain"], products["truth"], true_slope=slopes[speed],
-                            told_slope=slopes[speed + one * draw_], floor_m=mean[0],
+                            told_slope=slopes[speed + one * realization], floor_m=mean[0],
                         )
-                        for draw_ in draws
+                        for realization in draws
                     ]
                 )
                 for one in fine

@@ -210,18 +210,18 @@ def _problems(root: Any) -> Iterator[tuple[str, Any]]:
     import yaml
 
     sizes: dict[int, int] = {}
-    open_: set[int] = set()
+    entered: set[int] = set()
 
     def visit(node: Any, depth: int) -> Iterator[tuple[str, Any]]:
         if id(node) in sizes:
             return
-        if id(node) in open_:
+        if id(node) in entered:
             yield "an alias (*) stands within what it repeats", node.start_mark
             return
         if depth > _DEEPEST:
             yield f"it is nested deeper than {_DEEPEST} levels", node.start_mark
             return
-        open_.add(id(node))
+        entered.add(id(node))
         size = 1
         children: list[Any] = []
         if isinstance(node, yaml.ScalarNode):
@@ -237,7 +237,7 @@ def _problems(root: Any) -> Iterator[tuple[str, Any]]:
             size += sizes.get(id(child), 1)
         if size > _MOST_VALUES:
             yield f"its aliases stand for more than {_MOST_VALUES} values", node.start_mark
-        open_.discard(id(node))
+        entered.discard(id(node))
         sizes[id(node)] = size
 
     return visit(root, 0)

@@ -35,9 +35,9 @@ def _adder(windows: int) -> Any:
                 start, places = emit.window(
                     emit.load(indices, at, emit.ints), arguments[2], parts[0], taps, windows
                 )
-                looked_up = [emit.look_up(part_, start, places, taps, windows) for part_ in parts]
+                looked_up = [emit.look_up(one, start, places, taps, windows) for one in parts]
             else:
-                looked_up = [emit.gather(part_, indices, at, arguments[2], taps) for part_ in parts]
+                looked_up = [emit.gather(one, indices, at, arguments[2], taps) for one in parts]
             factors = [emit.load(emit.array(5, item), at) for item in range(weights.count)]
             values = []
             for found in looked_up:

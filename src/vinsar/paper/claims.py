@@ -529,14 +529,14 @@ class _Shaken:
         scatter = (
             deviation.std("realization", ddof=1) if count > 1 else 0 * deviation.mean("realization")
         )
-        radar_ = swept_section(study, "vibration", "radar")
+        vibrating_radar = swept_section(study, "vibration", "radar")
         place = instrument.middle(swept_section(study, "vibration", "scene"))
         return cls(
             deviation.mean("realization"),
             scatter / np.sqrt(count),
             sweep["motion_level_wavelengths"].values,
             float(products["truth"]["height"].std()),
-            float(instrument.Instrument.planned(radar_).random_phase_std(*place)),
+            float(instrument.Instrument.planned(vibrating_radar).random_phase_std(*place)),
         )
 
     def lacks(self, *, level: float, least_count: int = 1) -> str:

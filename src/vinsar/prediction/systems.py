@@ -71,17 +71,17 @@ def compare(sweep: xr.Dataset, study: Study) -> list[System]:
     statistics = variables.swept(sweep, "radar")
     found = []
     for number, changes in enumerate(over["radar"]):
-        radar_ = common.model_copy(update=changes)
-        planned = instrument.Instrument.planned(radar_)
+        arranged = common.model_copy(update=changes)
+        planned = instrument.Instrument.planned(arranged)
         place = instrument.middle(scene)
         across, ahead = planned.resolution(*place)
         found.append(
             System(
-                name=f"{_NAMES[radar_.system]}, {radar_.aperture_length_m:g} m",
+                name=f"{_NAMES[arranged.system]}, {arranged.aperture_length_m:g} m",
                 positions=planned.positions,
                 resolution_m=(float(across), float(ahead)),
                 height_of_ambiguity_m=float(planned.height_of_ambiguity(*place)),
-                scan_time_s=trajectory.scan_duration(radar_, study.vehicle),
+                scan_time_s=trajectory.scan_duration(arranged, study.vehicle),
                 accuracy=statistics.isel(radar=number),
             )
         )

@@ -252,7 +252,7 @@ def support(
 
 def focus(
     echo: xr.Dataset,
-    trajectory_: xr.Dataset,
+    antenna_paths: xr.Dataset,
     point: Floats,
     common: Support,
     *,
@@ -265,7 +265,7 @@ def focus(
     ----------
     echo
         Product ``received``, of two channels.
-    trajectory_
+    antenna_paths
         Product ``trajectory``: their positions as the radar knows them.
     point
         Places of the pixels on the surface (axis, y, x), m.
@@ -285,10 +285,10 @@ def focus(
     frequency = echo["frequency"].values
     samples = echo["echo"].values
     weights = waveform.window(aperture_window, samples.shape[1])
-    ends = np.stack([trajectory_["transmitter"].values, trajectory_["receiver"].values], axis=1)
+    ends = np.stack([antenna_paths["transmitter"].values, antenna_paths["receiver"].values], axis=1)
     corners = point.reshape(3, -1)
     near, far = trajectory.range_extent(
-        trajectory_, *(np.array([axis.min(), axis.max()]) for axis in corners)
+        antenna_paths, *(np.array([axis.min(), axis.max()]) for axis in corners)
     )
     transform, first_range, spacing, attenuation = _transform(frequency, near, far)
     windowed = waveform.window(range_window, frequency.size) / attenuation

@@ -202,7 +202,7 @@ def compress(
 
 def backproject(
     profiles: xr.Dataset,
-    trajectory_: xr.Dataset,
+    antenna_paths: xr.Dataset,
     *,
     x: NDArray[np.floating],
     y: NDArray[np.floating],
@@ -222,7 +222,7 @@ def backproject(
     ----------
     profiles
         Product ``profiles``.
-    trajectory_
+    antenna_paths
         Product ``trajectory``: the antenna positions as the radar knows them.
     x, y
         Axes of the grid, m.
@@ -248,7 +248,7 @@ def backproject(
     from vinsar.kernels import backprojection, rail
 
     samples = profiles["profile"].values
-    transmitter, receiver = trajectory_["transmitter"].values, trajectory_["receiver"].values
+    transmitter, receiver = antenna_paths["transmitter"].values, antenna_paths["receiver"].values
     if samples.shape[:2] != transmitter.shape[:2]:
         raise ValueError(
             f"profiles of {samples.shape[:2]} channels and positions do not fit a trajectory of "
@@ -265,7 +265,7 @@ def backproject(
     slant_range = profiles["slant_range"].values
     spacing = float(slant_range[-1] - slant_range[0]) / (slant_range.size - 1)
     cubic = profiles["profile"].attrs.get("interpolation", "linear") == "cubic"
-    near, far = trajectory.range_extent(trajectory_, x, y, z)
+    near, far = trajectory.range_extent(antenna_paths, x, y, z)
     near, far = near + min(0.0, extra.min()), far + max(0.0, extra.max())
     # A cubic reads one sample more on either side.
     spare = spacing if cubic else 0.0
@@ -388,8 +388,8 @@ def _image_grid(imaging: Imaging) -> Iterator[Fault]:
     for axis, spacing in zip("xy", grid.pixel(imaging), strict=True):
         low, high = getattr(imaging, f"{axis}_min_m"), getattr(imaging, f"{axis}_max_m")
         own = f"grid_spacing_{axis}_m"
-        key_ = "grid_spacing_m" if getattr(imaging, own) is None else own
-        yield from grid.check_multiple(f"imaging.{key_}", spacing, low, high, spacing)
+        spacing_key = "grid_spacing_m" if getattr(imaging, own) is None else own
+        yield from grid.check_multiple(f"imaging.{spacing_key}", spacing, low, high, spacing)
 
 
 STAGES = {

@@ -188,8 +188,8 @@ def dechirped(
         beat, frequency = shared, frequency[1:]
     if frequency[0] > frequency[-1]:
         beat, frequency = beat[..., ::-1], frequency[::-1]
-    samples_ = beat.conj()
-    return Echo(_restored(samples_, frequency, reference_range_m, notes), frequency, tuple(notes))
+    upward = beat.conj()
+    return Echo(_restored(upward, frequency, reference_range_m, notes), frequency, tuple(notes))
 
 
 def pulses(

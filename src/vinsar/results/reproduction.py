@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vinsar import results
 from vinsar.results import lineage, provenance
 
 if TYPE_CHECKING:
@@ -103,8 +104,9 @@ def reproduce(
             if not own.is_absolute() and not (place / own).exists():
                 (place / own).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy(own, place / own)
-        _run(place, [f"results/{folder.name}/{name}" for name in records], configuration, now)
-        fresh = place / "results" / folder.name
+        own_folder = results.folder(folder.name)
+        _run(place, [(own_folder / name).as_posix() for name in records], configuration, now)
+        fresh = place / own_folder
         differing = [
             name
             for name, record in records.items()

@@ -198,12 +198,12 @@ def measurement(path: str) -> dict[str, xr.Dataset]:
     echo = np.empty(parts[0].shape, np.result_type(*parts, np.complex64))
     echo.real, echo.imag = parts
     echo, *ends = _in_order(echo, *antennas)
-    ends_ = dict(zip(("transmitter", "receiver"), ends, strict=True))
-    trajectory_ = variables.dataset("trajectory", ends_)
+    phase_centers = dict(zip(("transmitter", "receiver"), ends, strict=True))
+    recorded_antennas = variables.dataset("trajectory", phase_centers)
     return {
         "received": variables.dataset("received", {"echo": echo}, {"frequency": frequency}),
-        "trajectory": trajectory_,
-        "recorded_trajectory": trajectory_,
+        "trajectory": recorded_antennas,
+        "recorded_trajectory": recorded_antennas,
     }
 
 
@@ -388,10 +388,10 @@ def _refuse_misplaced(antennas: Antennas, near_edge_m: float) -> None:
 
 
 def _refuse_ambiguous(frequency: Floats, antennas: Antennas, imaging: Imaging) -> None:
-    trajectory_ = variables.dataset(
+    recorded_antennas = variables.dataset(
         "trajectory", dict(zip(("transmitter", "receiver"), antennas, strict=True))
     )
-    near, far = trajectory.range_extent(trajectory_, *grid.image_axes(imaging))
+    near, far = trajectory.range_extent(recorded_antennas, *grid.image_axes(imaging))
     step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
     unambiguous = waveform.unambiguous_range(step)
     if far - near > unambiguous:

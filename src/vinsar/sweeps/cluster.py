@@ -89,7 +89,7 @@ def _connect(address: str) -> Any:
 
 
 def _on_threads(
-    count: int, function: Function, blocks_: list[Any], receive: Receive, lost: Lost
+    count: int, function: Function, pieces: list[Any], receive: Receive, lost: Lost
 ) -> None:
     import dask
     from dask.callbacks import Callback
@@ -100,16 +100,16 @@ def _on_threads(
         receive(result)
 
     with Callback(posttask=finished), dask.config.set(scheduler="threads", num_workers=count):
-        blocks.run(function, ((block,) for block in blocks_))
+        blocks.run(function, ((block,) for block in pieces))
 
 
 def _on_cluster(
-    client: Any, function: Function, blocks_: list[Any], receive: Receive, lost: Lost
+    client: Any, function: Function, pieces: list[Any], receive: Receive, lost: Lost
 ) -> None:
     from distributed import KilledWorker, as_completed
     from distributed.client import FutureCancelledError
 
-    runs = processes.Runs(blocks_)
+    runs = processes.Runs(pieces)
     running: dict[Any, tuple[str, Any]] = {}
     completed = as_completed()
     suspects = []

@@ -555,7 +555,7 @@ def run(
         If a case is not valid; nothing has run then.
     """
     known = {label: (data, _fingerprint(data)) for label, data in (given or {}).items()}
-    everything = cases(study, name, *(print_ for _, print_ in known.values()))
+    everything = cases(study, name, *(digest for _, digest in known.values()))
     finished, keep, progress = finished or {}, keep or _nothing, progress or _nothing
     rows = {case.key: finished[case.key] for case in everything if case.key in finished}
     waiting = [case for case in everything if case.key not in rows]
