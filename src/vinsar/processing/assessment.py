@@ -116,22 +116,24 @@ def assess(
     wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
     own = np.minimum(by_noise + uncertainty.mean(taken**2, wide), uncertainty.UNIFORM)
     shared = _reference_variance(reference, noise, product, own, x, y)
-    per_difference = instrument.height_per_difference(across, ahead)
-    per_phase = np.abs(per_difference) * instrument.wavelength / (2 * np.pi)
+    ambiguity = instrument.height_of_ambiguity(across, ahead)
+    per_phase = ambiguity / (2 * np.pi)
+    drift = _drift(instrument, x, y)
     # Interpolation between two pixels along y averages their noise.
     share = np.where(np.isfinite(true_y), (true_y - ahead) / spacing[1], 0.0) % 1
     alike = filter_.neighbours(noise.decorrelation, spacing)
     kept = 1 - 2 * share * (1 - share) * (1 - alike)
     std = np.sqrt(code((kept * own + shared) * per_phase**2)) * _at_one_place(
-        instrument, height, resolution, x, y
+        drift, height, resolution, spacing
     )
     cycles = classification.split_band(
         pictures, absolute - flat, antennas,
         x=x, y=y, wavelength_m=instrument.wavelength, resolution=resolution,
         # The phase is -2 pi / lambda times the difference.
-        relative_bandwidth=bandwidth, rising=bool(np.median(per_difference) < 0),
+        relative_bandwidth=bandwidth,
+        rising=bool(instrument.height_per_difference(x[x.size // 2], y[y.size // 2]) < 0),
     )  # fmt: skip
-    slack = 2 * np.sqrt(own) * per_phase * np.abs(_drift(instrument, x, y)[1])
+    slack = 2 * np.sqrt(own) * per_phase * np.abs(drift[1])
     held = np.zeros(product.shape, bool)
     for where in reference.rectangles:
         held[where] = True
@@ -144,7 +146,7 @@ def assess(
         folded=classification.coded(code, classification.layover(true_y, slack)),
         variance=code(by_noise),
         cycles=[classification.Cycles(code(part.missing), code(part.std)) for part in cycles],
-        ambiguity=instrument.height_of_ambiguity(across, ahead),
+        ambiguity=ambiguity,
         reference=held,
         antennas=_before(instrument, float(y[0])),
         x=x,
@@ -174,10 +176,9 @@ def _drift(instrument: Instrument, x: Floats, y: Floats) -> Floats:
 
 
 def _at_one_place(
-    instrument: Instrument, height: Floats, resolution: Floats, x: Floats, y: Floats
+    drift: Floats, height: Floats, resolution: Floats, spacing: tuple[float, float]
 ) -> Floats:
     """Return the error at a place over that of a pixel, which moves with its height (y, x)."""
-    spacing = _spacing(x, y)
     known = np.isfinite(height)
     level = float(np.median(height[known])) if known.any() else 0.0
     smooth = uncertainty.mean(
@@ -185,7 +186,7 @@ def _at_one_place(
         uncertainty.window(uncertainty.PHASE_LOOKS, resolution, spacing),
     )
     slope = uncertainty.slopes(smooth, spacing)
-    return np.abs(1 - (slope * _drift(instrument, x, y)).sum(axis=0))
+    return np.abs(1 - (slope * drift).sum(axis=0))
 
 
 def _reference_variance(

@@ -351,22 +351,40 @@ class Fan:
         ground = float(np.nanmedian(height)) if np.isfinite(height).any() else 0.0
         found = np.zeros(shade.shape, bool)
         edge = np.diff(np.pad(shade, ((1, 1), (0, 0))), axis=0)
-        for ray in range(shade.shape[1]):
-            begins, ends = np.nonzero(edge[:, ray] == 1)[0], np.nonzero(edge[:, ray] == -1)[0]
-            for begin, end in zip(begins, ends, strict=True):
-                if end - begin < reach or begin == 0:
-                    continue
-                behind = heights[end : end + reach, ray]
-                level = np.median(behind) if np.isfinite(behind).all() and behind.size else ground
-                length = (end - begin) * spacing
-                needed = level + (top - level) * length / (away[begin] + length)
-                before = slice(max(0, begin - reach), begin)
-                here = heights[before, ray]
-                if np.isfinite(here).any() and (
-                    needed - np.nanmax(here) > cycle[begin - 1, ray] / 2
-                ):
-                    found[before, ray] = True
+        (ray, begin), (_, end) = np.nonzero(edge.T == 1), np.nonzero(edge.T == -1)
+        told = (end - begin >= reach) & (begin > 0)
+        ray, begin, end = ray[told], begin[told], end[told]
+        behind, inside = _taken(heights, end, ray, reach)
+        level = np.where(
+            inside.any(axis=1) & (np.isfinite(behind) | ~inside).all(axis=1),
+            _medians(np.where(inside, behind, np.inf), inside.sum(axis=1)),
+            ground,
+        )
+        length = (end - begin) * spacing
+        needed = level + (top - level) * length / (away[begin] + length)
+        here, inside = _taken(heights, begin - reach, ray, reach)
+        highest = np.where(inside & np.isfinite(here), here, -np.inf).max(axis=1, initial=-np.inf)
+        low = np.isfinite(highest) & (needed - highest > cycle[begin - 1, ray] / 2)
+        rows = (begin - reach)[:, None] + np.arange(reach)
+        flagged = low[:, None] & inside
+        found[rows[flagged], np.broadcast_to(ray[:, None], rows.shape)[flagged]] = True
         return np.asarray(self.back(found), bool)
+
+
+def _taken(
+    values: Floats, first: NDArray[np.integer], ray: NDArray[np.integer], count: int
+) -> tuple[Floats, Flags]:
+    """Return so many rows of rays from the first on (n, count), and which of them there are."""
+    rows = first[:, None] + np.arange(count)
+    inside = (rows >= 0) & (rows < values.shape[0])
+    return values[np.clip(rows, 0, values.shape[0] - 1), ray[:, None]], inside
+
+
+def _medians(values: Floats, counts: NDArray[np.integer]) -> Floats:
+    """Return the median of the smallest so many values of each row."""
+    ordered = np.sort(values, axis=1)
+    row, last = np.arange(len(values)), np.maximum(counts, 1)
+    return np.asarray((ordered[row, (last - 1) // 2] + ordered[row, last // 2]) / 2)
 
 
 def uncertain_cycles(
