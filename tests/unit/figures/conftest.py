@@ -71,9 +71,11 @@ def study(make_study):
 
 
 @pytest.fixture(scope="session")
-def products(study, make_sweep):
+def products(study, make_study, make_sweep):
     """Return the products of the small study, and sweeps with made-up heights."""
     made = pipeline.run(study)
+    three = make_study(**SMALL | {"radar": SMALL["radar"] | {"baselines_m": [0.06, 0.3]}})
+    made["two_antennas"] = pipeline.run(three, "two_antennas")["two_antennas"]
     for name, sweep in study.sweeps.items():
         over = {key: list(values) for key, values in sweep.over.items()}
         shape = tuple(len(values) for values in over.values())
