@@ -433,3 +433,12 @@ def test_every_case_has_the_terrain_that_is_given(tiny):
     other = {"elevation": terrain}
     again = run(with_sweep(own, {"echo.occlusion": [True]}), finished=rows, given=other)
     assert np.abs(again["std"] - found["std"]).min() > 0
+
+
+def test_realizations_share_one_study(tiny):
+    over = {"motion.level_wavelengths": [0.0, 0.1], "filtering.goldstein_alpha": [0.3, 0.8]}
+    cases = sweep.cases(with_sweep(tiny, over, 1000), "quick")
+    assert len({case.key for case in cases}) == 4000
+    # A study is 20 kB in memory: each realization's own would be gigabytes in a large sweep.
+    assert len({id(case.first) for case in cases}) == 4
+    assert {case.study.realization for case in cases} == set(range(1000))

@@ -93,7 +93,7 @@ class SweepError(RuntimeError):
     """Cases that raised; those that finished are kept."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Case:
     """One study of a sweep.
 
@@ -103,20 +103,25 @@ class Case:
         Place along each swept key, and the realization last.
     changes
         Swept key and its value.
-    study
-        The study.
+    first
+        The study of realization 0, which all realizations share.
     key
         Digest of all that the case depends on in the configuration.
     """
 
     index: tuple[int, ...]
     changes: dict[str, Any]
-    study: Study
+    first: Study
     key: str
+
+    @property
+    def study(self) -> Study:
+        """The study."""
+        return self.first.model_copy(update={"realization": self.index[-1]})
 
     def __str__(self) -> str:
         values = ", ".join(f"{key} = {value}" for key, value in self.changes.items())
-        return f"{values}, realization {self.study.realization}"
+        return f"{values}, realization {self.index[-1]}"
 
 
 def _digest(*parts: str | bytes) -> str:
@@ -228,22 +233,25 @@ def cases(study: Study, name: str, *given: str) -> list[Case]:
     names = declared(study, name)
     shape = [len(values) for values in sweep.over.values()]
     sections = [stage.sections for stage in _stages(study, name).values()]
+    realizations = np.arange(sweep.realizations)
     # What the first stages read changes slowest, so that few of their products are kept at a time.
     seen: list[dict[str, int]] = [{} for _ in sections]
-    found = []
+    found, ranks = [], []
     for index, (changes, case) in zip(np.ndindex(*shape), studies(study, name), strict=True):
-        values = case.values(names)
+        values = case.values(names) | {"realization": None}
+        whole = _text(values)
         for realization in range(sweep.realizations):
-            values["realization"] = realization
-            texts = (_text({key: values[key] for key in part}) for part in sections)
-            rank = [
-                known.setdefault(text, len(known)) for known, text in zip(seen, texts, strict=True)
-            ]
-            one = case.model_copy(update={"realization": realization})
-            key = _digest(_text(values), *given)
-            found.append((rank, Case((*index, realization), changes, one, key)))
-    found.sort(key=lambda item: item[0])
-    return [case for _, case in found]
+            key = _digest(whole, str(realization), *given)
+            found.append(Case((*index, realization), changes, case, key))
+        rank = np.empty((len(sections), sweep.realizations), int)
+        for place, (known, part) in enumerate(zip(seen, sections, strict=True)):
+            text = _text({key: values[key] for key in part})
+            rank[place] = known.setdefault(text, len(known)) * sweep.realizations
+            if "realization" in part:
+                rank[place] += realizations
+        ranks.append(rank)
+    order = np.lexsort(np.concatenate(ranks, axis=1)[::-1])
+    return [found[place] for place in order]
 
 
 def _refuse_idle(study: Study, name: str) -> None:
