@@ -177,10 +177,12 @@ def test_each_cell_has_the_class_of_its_fault():
     folded[20, 10] = True
     reference = np.zeros(dark.shape, bool)
     reference[:2] = True
+    loose = np.zeros(dark.shape, bool)
+    loose[4, -3:] = True
     found = classification.classify(
         height, std, dark=dark, folded=folded, variance=variance,
         cycles=[Cycles(grid(), grid(0.1)), Cycles(grid(), grid(0.1))], ambiguity=grid(0.9),
-        reference=reference, antennas=[ANTENNA], x=X, y=Y, window_px=(5, 5),
+        reference=reference, loose=loose, antennas=[ANTENNA], x=X, y=Y, window_px=(5, 5),
     )  # fmt: skip
     assert found.dtype == np.int8
     assert (found[-1] == classification.OUTSIDE).all()
@@ -189,4 +191,5 @@ def test_each_cell_has_the_class_of_its_fault():
     assert found[np.abs(Y - 14) < 0.01, X.size // 2] == classification.SHADOW
     assert found[5, 5] == classification.INCOHERENT
     assert found[20, 10] == classification.LAYOVER
-    assert (found[:5] == classification.VALID).all()
+    assert (found[4, -3:] == classification.UNCERTAIN_CYCLE).all()
+    assert (found[:5][~loose[:5]] == classification.VALID).all()

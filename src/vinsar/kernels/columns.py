@@ -14,26 +14,32 @@ def resample(values: np.ndarray, place: np.ndarray, axis: np.ndarray, out: np.nd
     Parameters
     ----------
     values, place
-        Values and where they belong (row, column), float64; NaN places do not count.
+        Values and where they belong (row, column), float64. A NaN place is missing: between the
+        rows on its two sides nothing is interpolated.
     axis
         Where to interpolate (row,), evenly spaced and rising.
     out
-        Output (row, column), float64; NaN more than a step of the axis beyond the outermost place.
+        Output (row, column), float64; NaN more than a step of the axis beyond the outermost place,
+        and more than half a step from the places on either side of a missing one.
     """
     rows, columns = values.shape
     spacing = axis[1] - axis[0]
     x, y = np.empty(rows), np.empty(rows)
+    # How many are missing before each place.
+    before = np.empty(rows, np.int64)
     for column in range(columns):
-        count = 0
+        count = missing = 0
         for row in range(rows):
             if np.isfinite(place[row, column]):
                 # Places mostly rise. Those that coincide stay in the order of the image.
                 at = count
                 while at > 0 and x[at - 1] > place[row, column]:
-                    x[at], y[at] = x[at - 1], y[at - 1]
+                    x[at], y[at], before[at] = x[at - 1], y[at - 1], before[at - 1]
                     at -= 1
-                x[at], y[at] = place[row, column], values[row, column]
+                x[at], y[at], before[at] = place[row, column], values[row, column], missing
                 count += 1
+            else:
+                missing += 1
         if count == 0:
             out[:, column] = np.nan
             continue
@@ -49,6 +55,13 @@ def resample(values: np.ndarray, place: np.ndarray, axis: np.ndarray, out: np.nd
                 out[row, column] = y[0]
             elif left == count - 1:
                 out[row, column] = y[count - 1]
+            elif before[left] != before[left + 1]:
+                if target - x[left] <= spacing / 2:
+                    out[row, column] = y[left]
+                elif x[left + 1] - target < spacing / 2:
+                    out[row, column] = y[left + 1]
+                else:
+                    out[row, column] = np.nan
             else:
                 share = (target - x[left]) / (x[left + 1] - x[left])
                 out[row, column] = y[left] + share * (y[left + 1] - y[left])

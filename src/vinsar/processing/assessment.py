@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vinsar.processing import classification, uncertainty
+from vinsar.processing import classification, masks, uncertainty
 from vinsar.processing.filtering import response_to
 from vinsar.radar import aperture, waveform
 from vinsar.radar.instrument import Instrument
@@ -69,7 +69,7 @@ def assess(
     images, interferogram, filtered
         Products of these names.
     phase
-        Absolute phase at the image's pixels (y, x), rad.
+        Absolute phase at the image's pixels (y, x), rad; NaN where there is none.
     height
         Heights on the grid (y, x), m; NaN where there is none.
     true_y
@@ -137,6 +137,7 @@ def assess(
     held = np.zeros(product.shape, bool)
     for where in reference.rectangles:
         held[where] = True
+    numbers, _ = masks.islands(np.isfinite(phase))
     kind = classification.classify(
         height,
         std,
@@ -148,6 +149,7 @@ def assess(
         cycles=[classification.Cycles(code(part.missing), code(part.std)) for part in cycles],
         ambiguity=ambiguity,
         reference=held,
+        loose=classification.coded(code, ~np.isin(numbers, numbers[held])),
         antennas=_before(instrument, float(y[0])),
         x=x,
         y=y,

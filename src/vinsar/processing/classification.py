@@ -500,6 +500,7 @@ def classify(
     cycles: Sequence[Cycles],
     ambiguity: Floats,
     reference: Flags,
+    loose: Flags,
     antennas: Sequence[Floats],
     x: Floats,
     y: Floats,
@@ -525,6 +526,8 @@ def classify(
         Height of ambiguity, m.
     reference
         Cells of the height reference.
+    loose
+        Cells of pixels that no phase connects with it.
     antennas
         Places (3,) of the antennas before the image, m; without any, geometry says nothing.
     x, y
@@ -559,7 +562,7 @@ def classify(
     alone = islands(known, reference, cycles[0], window_px=window_px)
     result = np.full(height.shape, VALID, np.int8)
     result[incoherent] = INCOHERENT
-    result[uncertain | alone] = UNCERTAIN_CYCLE
+    result[uncertain | alone | loose] = UNCERTAIN_CYCLE
     result[folded] = LAYOVER
     result[dark | hidden] = SHADOW
     result[outside] = OUTSIDE

@@ -387,7 +387,8 @@ def _refined(products: Products, study: Study) -> xr.Dataset:
     return variables.dataset(
         "refined",
         {
-            "phase": known + rest - offset,
+            # What the first pass has no phase of, it has no surface of.
+            "phase": np.where(np.isfinite(unwrapped["phase"]), known + rest - offset, np.nan),
             "image": np.stack([lower, upper / turn]),
             "interferogram": lower * np.conj(upper) * turn,
             "filtered": filtered / constant * turn,

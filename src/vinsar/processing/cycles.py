@@ -19,7 +19,7 @@ import numpy as np
 from vinsar.foundations import variables
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import filtering, height
+from vinsar.processing import filtering, height, masks
 from vinsar.radar import aperture, trajectory
 
 if TYPE_CHECKING:
@@ -77,6 +77,11 @@ def constant(
     -------
     float
         The mean over the points on the circle, -pi to pi.
+
+    Raises
+    ------
+    ValueError
+        If no point has a phase.
     """
     image_x, image_y = aperture.image_position(pair[0], *points)
     expected = aperture.interferometric_phase(*pair, *points, wavelength_m)
@@ -84,7 +89,10 @@ def constant(
     place = [(image_y - y[0]) / (y[1] - y[0]), (image_x - x[0]) / (x[1] - x[0])]
     row, column = (np.rint(axis).astype(int) for axis in place)
     row, column = np.clip(row, 0, y.size - 1), np.clip(column, 0, x.size - 1)
-    return float(np.angle(np.mean(np.exp(1j * (expected - phase[row, column])))))
+    missing = (expected - phase[row, column])[np.isfinite(phase[row, column])]
+    if not missing.size:
+        raise ValueError("none of the points of known height lies where there is a phase")
+    return float(np.angle(np.mean(np.exp(1j * missing))))
 
 
 def predict(
@@ -180,7 +188,7 @@ def settle(
     Parameters
     ----------
     phase
-        Measured phase (y, x), rad.
+        Measured phase (y, x), rad; NaN where there is none.
     told
         What it must be (y, x), from `told`, rad, up to a constant; NaN where that is not known.
     window_px
@@ -192,7 +200,7 @@ def settle(
     Returns
     -------
     ndarray, shape (y, x)
-        As measured, plus whole cycles, rad.
+        As measured, plus whole cycles, rad; NaN where there is no phase.
 
     Raises
     ------
@@ -203,14 +211,19 @@ def settle(
 
     if any(side < 1 or side % 2 == 0 for side in window_px):
         raise ValueError(f"the sides of the window, {window_px} pixels, must be odd and positive")
+    missing = ~np.isfinite(phase)
+    if missing.all():
+        return np.array(phase, float)
+    phase = masks.fill(phase)
     # The channels' constant: what most of the scene says.
-    known = np.isfinite(told)
+    known = np.isfinite(told) & ~missing
     level = np.angle(np.exp(1j * (told - phase)[known]).sum()) if known.any() else 0.0
     expected = np.where(known, told - level, phase)
     found = np.array(phase, float)
     if not unwrapped:
         found += _CYCLE * np.rint((median_filter(expected, window_px) - found) / _CYCLE)
     found += _CYCLE * np.rint(median_filter(expected - found, window_px) / _CYCLE)
+    found[missing] = np.nan
     return found
 
 

@@ -16,6 +16,7 @@ from vinsar.foundations import variables
 from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
+from vinsar.processing import masks
 from vinsar.processing.classification import VALID
 from vinsar.radar import geometry
 
@@ -274,7 +275,7 @@ def detect(dem: xr.Dataset, images: xr.Dataset, *, options: Detection) -> xr.Dat
     x, y = dem["x"].values, dem["y"].values
     window = _window(options.multilook_window_m, x, y)
     power = (np.abs(images["image"].values) ** 2).mean(axis=0)
-    intensity = uniform_filter(power, window, mode="nearest")
+    intensity = masks.average(lambda part: uniform_filter(part, window, mode="nearest"), power)
     surroundings = running_median(intensity, _window(options.background_window_m, x, y))
     contrast = intensity / np.maximum(surroundings, np.finfo(float).tiny)
     least = options.minimum_area_m2 / pixel_area(x, y)

@@ -13,7 +13,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import response
+from vinsar.processing import masks, response
 from vinsar.radar import waveform
 
 if TYPE_CHECKING:
@@ -51,12 +51,12 @@ def goldstein(
 
     Overlapping patches are transformed, multiplied with their magnitude spectrum, smoothed by
     3 x 3, to the power alpha, transformed back and added up with a tapered weight. Outside the
-    interferogram there are zeros, which weigh nothing.
+    interferogram, and where it is not finite, there are zeros, which weigh nothing.
 
     Parameters
     ----------
     interferogram
-        Complex interferogram (y, x).
+        Complex interferogram (y, x), NaN where there is none.
     alpha
         Strength, 0 (none) to 1.
     patch_px
@@ -67,7 +67,7 @@ def goldstein(
     Returns
     -------
     ndarray, shape (y, x), complex64
-        Filtered interferogram.
+        Filtered interferogram; NaN where there was none.
 
     Raises
     ------
@@ -85,6 +85,7 @@ def goldstein(
             f"a step of {step_px} pixels must divide the patch of {patch_px} pixels twice or more"
         )
     rows, columns = interferogram.shape
+    known = np.isfinite(interferogram)
     # Every pixel lies in as many patches as every other.
     lead = patch_px - step_px
     down = -(-(rows + lead) // step_px)
@@ -92,7 +93,7 @@ def goldstein(
     padded = np.zeros(
         (lead + down * step_px + patch_px, lead + across * step_px + patch_px), np.complex64
     )
-    padded[lead : lead + rows, lead : lead + columns] = interferogram
+    padded[lead : lead + rows, lead : lead + columns] = np.where(known, interferogram, 0)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (patch_px, patch_px))
     patches = windows[: down * step_px : step_px, : across * step_px : step_px]
     taper = np.sin(np.pi * (np.arange(patch_px) + 0.5) / patch_px).astype(np.float32) ** 2
@@ -116,7 +117,9 @@ def goldstein(
         total[begin * step_px : begin * step_px + len(band)] += band
     # Tapers squared-sine at a step that divides the patch add up to a constant.
     gain = (patch_px / (2 * step_px)) ** 2
-    return np.asarray(total[lead : lead + rows, lead : lead + columns] / gain, np.complex64)
+    filtered = np.asarray(total[lead : lead + rows, lead : lead + columns] / gain, np.complex64)
+    filtered[~known] = np.nan
+    return filtered
 
 
 def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]:
@@ -125,14 +128,14 @@ def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]
     Parameters
     ----------
     interferogram
-        Complex interferogram (y, x).
+        Complex interferogram (y, x), NaN where there is none.
     window_px
         Side of the window, pixels, odd.
 
     Returns
     -------
     ndarray, shape (y, x), complex64
-        Filtered interferogram; at the edges, over what the window covers.
+        Filtered interferogram, over the pixels that the window covers; NaN where there was none.
 
     Raises
     ------
@@ -143,10 +146,16 @@ def boxcar(interferogram: Complexes, *, window_px: int) -> NDArray[np.complex64]
 
     if window_px < 1 or window_px % 2 == 0:
         raise ValueError(f"the boxcar of {window_px} pixels must be odd and positive")
+
+    def smooth(values: Complexes) -> Complexes:
+        sums = uniform_filter(values, window_px, mode="constant")
+        covered = [
+            uniform_filter(np.ones(size), window_px, mode="constant") for size in values.shape
+        ]
+        return np.asarray(sums / np.outer(*covered))
+
     values = np.asarray(interferogram, np.complex128)
-    sums = uniform_filter(values, window_px, mode="constant")
-    covered = [uniform_filter(np.ones(size), window_px, mode="constant") for size in values.shape]
-    return np.asarray(sums / np.outer(*covered), np.complex64)
+    return np.asarray(masks.average(smooth, values), np.complex64)
 
 
 def gaussian(interferogram: Complexes, *, std_px: float) -> NDArray[np.complex64]:
@@ -155,7 +164,7 @@ def gaussian(interferogram: Complexes, *, std_px: float) -> NDArray[np.complex64
     Parameters
     ----------
     interferogram
-        Complex interferogram (y, x).
+        Complex interferogram (y, x), NaN where there is none.
     std_px
         Standard deviation of the weight, pixels; it averages as many pixels as a window of
         ``4 pi std_px^2`` of equal weights.
@@ -163,7 +172,7 @@ def gaussian(interferogram: Complexes, *, std_px: float) -> NDArray[np.complex64
     Returns
     -------
     ndarray, shape (y, x), complex64
-        Filtered interferogram; at the edges, over what there is.
+        Filtered interferogram, over the pixels that there are; NaN where there was none.
 
     Raises
     ------
@@ -174,18 +183,21 @@ def gaussian(interferogram: Complexes, *, std_px: float) -> NDArray[np.complex64
 
     if not std_px > 0:
         raise ValueError(f"a Gaussian of {std_px} pixels must be wider than 0")
-    values = np.asarray(interferogram, np.complex64)
-    for axis, size in enumerate(values.shape):
-        covered = gaussian_filter1d(np.ones(size), std_px, mode="constant")
-        parts = (
-            gaussian_filter1d(part, std_px, axis=axis, mode="constant")
-            for part in (values.real, values.imag)
-        )
-        shape = [1, 1]
-        shape[axis] = size
-        real, imag = (part / covered.reshape(shape) for part in parts)
-        values = np.asarray(real + 1j * imag, np.complex64)
-    return values
+
+    def smooth(values: Complexes) -> Complexes:
+        for axis, size in enumerate(values.shape):
+            covered = gaussian_filter1d(np.ones(size), std_px, mode="constant")
+            parts = (
+                gaussian_filter1d(part, std_px, axis=axis, mode="constant")
+                for part in (values.real, values.imag)
+            )
+            shape = [1, 1]
+            shape[axis] = size
+            real, imag = (part / covered.reshape(shape) for part in parts)
+            values = np.asarray(real + 1j * imag, np.complex64)
+        return values
+
+    return masks.average(smooth, np.asarray(interferogram, np.complex64))
 
 
 def _goldstein(
@@ -356,7 +368,7 @@ def smooth(interferogram: Complexes, *, method: str, **options: Any) -> Complexe
     Parameters
     ----------
     interferogram
-        Complex interferogram (y, x).
+        Complex interferogram (y, x), NaN where there is none.
     method
         A key of `FILTERS`; ``none`` passes the interferogram on.
     options
@@ -365,7 +377,7 @@ def smooth(interferogram: Complexes, *, method: str, **options: Any) -> Complexe
     Returns
     -------
     ndarray, shape (y, x)
-        Filtered interferogram.
+        Filtered interferogram; NaN there and nowhere else.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import assessment, classification
+from vinsar.processing import assessment, classification, masks
 from vinsar.radar import aperture, geometry, grid, trajectory, waveform
 
 if TYPE_CHECKING:
@@ -157,26 +157,28 @@ def phase_offset(
 
     Unwrapping leaves one constant unknown. Each reference point tells it: its absolute phase is
     known (Eq. 1), and so is the pixel where it is imaged. The constant is the median over points,
-    the plane a fit by least absolute deviations, so that single bad pixels do not count.
+    the plane a fit by least absolute deviations, so that single bad pixels do not count. Islands of
+    the phase have whole cycles of their own besides, which the points on each tell.
 
     Parameters
     ----------
     unwrapped, images
         Products of these names.
     points
-        x, y and height of the reference points, m.
+        x, y and height of the reference points, m. Those without a phase do not count.
     trend
         What to fit.
 
     Returns
     -------
     ndarray, shape (y, x)
-        Phase to add, rad.
+        Phase to add, rad; to islands without a point that of the island with most.
 
     Raises
     ------
     ValueError
-        If a reference point is imaged outside the grid, or there are too few for the trend.
+        If a reference point is imaged outside the grid, none has a phase, or there are too few for
+        the trend.
     """
     from scipy.ndimage import map_coordinates
 
@@ -185,8 +187,7 @@ def phase_offset(
     wavelength = float(images["wavelength"])
     point_x, point_y, point_height = points
     image_x, image_y = aperture.image_position(lower, point_x, point_y, point_height)
-    column = (image_x - x[0]) / (x[1] - x[0])
-    row = (image_y - y[0]) / (y[1] - y[0])
+    row, column = _place(image_y, y), _place(image_x, x)
     # A pixel's width of tolerance: declared ground may end at the image's edge.
     inside = (row > -1) & (row < y.size) & (column > -1) & (column < x.size)
     if not inside.all():
@@ -199,16 +200,65 @@ def phase_offset(
         lower, upper, point_x, point_y, point_height, wavelength
     )
     flat = aperture.flat_earth_phase(lower, upper, image_x, image_y, wavelength)
-    found = map_coordinates(unwrapped["phase"].values, [row, column], order=1, mode="nearest")
-    missing = absolute - flat - found
+    phase = unwrapped["phase"].values
+    pixel = tuple(
+        np.clip(np.rint(at).astype(int), 0, size - 1)
+        for at, size in zip((row, column), phase.shape, strict=True)
+    )
+    known = np.isfinite(phase)
+    counted = known[pixel]
+    if not counted.any():
+        raise ValueError(
+            "none of the reference points lies where there is a phase; declare level ground or "
+            "control points that the radar sees"
+        )
+    found = map_coordinates(masks.fill(phase), [row, column], order=1, mode="nearest")
+    missing = (absolute - flat - found)[counted]
+    image_x, image_y = image_x[counted], image_y[counted]
+    numbers, count = masks.islands(known)
+    turns = _turns(missing, numbers[pixel][counted], count)
+    missing = missing - turns[numbers[pixel][counted]]
     if trend == "constant":
-        return np.full((y.size, x.size), np.median(missing))
+        return np.median(missing) + turns[numbers]
     if len(missing) < 3:
         raise ValueError(f"a plane needs three or more reference points, not {len(missing)}")
     constant, slope_x, slope_y = geometry.fit_plane(
         image_x, image_y - y[0], missing, least_residual=_LEAST_RESIDUAL
     )
-    return np.asarray(constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0]))
+    plane = constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0])
+    return np.asarray(plane + turns[numbers])
+
+
+def _place(values: Floats, axis: Floats) -> Floats:
+    """Return where values are on an axis, in its steps; of a single pixel, as if a metre wide."""
+    step = axis[1] - axis[0] if axis.size > 1 else 1.0
+    return np.asarray((values - axis[0]) / step)
+
+
+def _turns(missing: Floats, island: NDArray[np.integer], count: int) -> Floats:
+    """Return the whole cycles that each island needs beside that of most points, rad.
+
+    Parameters
+    ----------
+    missing
+        Phase that the reference points say is missing, rad.
+    island
+        Number of each point's island, from 1 on.
+    count
+        How many islands there are.
+
+    Returns
+    -------
+    ndarray, shape (count + 1,)
+        By number of the island; 0 for those without a point.
+    """
+    points = np.bincount(island, minlength=count + 1)
+    level = np.median(missing[island == points.argmax()])
+    turns = np.zeros(count + 1)
+    for number in np.nonzero(points)[0]:
+        away = np.median(missing[island == number]) - level
+        turns[number] = 2 * np.pi * np.rint(away / (2 * np.pi))
+    return turns
 
 
 def code_dem(
@@ -232,7 +282,8 @@ def code_dem(
     Returns
     -------
     ndarray, shape (y, x)
-        Heights on the grid, m; NaN more than a pixel beyond the outermost known height.
+        Heights on the grid, m; NaN more than a pixel beyond the outermost known height, and where
+        a pixel's is not known.
 
     Raises
     ------

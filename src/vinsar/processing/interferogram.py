@@ -54,14 +54,15 @@ def coherence(
     Parameters
     ----------
     lower, upper
-        Images of one shape (y, x).
+        Images of one shape (y, x), NaN where there is none.
     window_px
-        Side of the square boxcar, odd; at the edges it covers what there is.
+        Side of the square boxcar, odd; at the edges, and where an image is NaN, it covers what
+        there is.
 
     Returns
     -------
     ndarray, shape (y, x)
-        Coherence from 0 to 1; 0 where an image is zero all over the window.
+        Coherence from 0 to 1; 0 where an image is zero all over the window, NaN where it is NaN.
 
     Raises
     ------
@@ -73,9 +74,13 @@ def coherence(
     if window_px < 1 or window_px % 2 == 0:
         raise ValueError(f"the coherence window of {window_px} pixels must be odd and positive")
     result = np.empty(lower.shape)
+    known = np.isfinite(lower) & np.isfinite(upper)
+    if not known.all():
+        lower, upper = np.where(known, lower, 0), np.where(known, upper, 0)
     multilook.coherence(
         np.ascontiguousarray(lower), np.ascontiguousarray(upper), window_px // 2, result
     )
+    result[~known] = np.nan
     return result
 
 

@@ -239,13 +239,16 @@ def noise_variance(
     """
     resolution = noise.decorrelation.resolution
     if filter_.follows_amplitude:
-        amplitude = np.abs(filtered)
+        amplitude = np.abs(filtered).astype(float)
     else:
         amplitude = np.abs(mean(product, window(PHASE_LOOKS, resolution, spacing)))
     gain = filter_.gain(noise.decorrelation, product.shape, spacing)
-    inverse = gain * noise.power / np.maximum(amplitude, _TINY)
+    left = gain * noise.power
+    # Beyond 10 it is uniform, and where there is no signal.
+    inverse = np.divide(left, amplitude, out=np.full(left.shape, 10.0), where=amplitude > 0)
+    inverse = np.minimum(inverse, 10)
     # The interval of a von Mises distribution that holds 68.3 %, to 5 % from |Z| = nu up.
-    return np.minimum(inverse * (1 + np.minimum(inverse, 10) / 2), UNIFORM)
+    return np.minimum(inverse * (1 + inverse / 2), UNIFORM)
 
 
 def smoothing(

@@ -14,7 +14,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import cycles, interferogram
+from vinsar.processing import cycles, interferogram, masks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
+    Flags = NDArray[np.bool_]
 
 _NO_SNAPHU = (
     "snaphu is not installed, as its solver is free for non-commercial use only; install it into "
@@ -65,7 +66,8 @@ def residues(phase: Floats) -> NDArray[np.int8]:
     Returns
     -------
     ndarray of int8, shape (y, x)
-        -1, 0 or 1; the last row and column, which begin no cell, hold 0.
+        -1, 0 or 1; the last row and column, which begin no cell, hold 0, and so do cells with a
+        corner that has no phase.
     """
 
     def turns(difference: Floats) -> Floats:
@@ -74,7 +76,7 @@ def residues(phase: Floats) -> NDArray[np.int8]:
     right, up = np.diff(phase, axis=1), np.diff(phase, axis=0)
     right, up = right - 2 * np.pi * turns(right), up - 2 * np.pi * turns(up)
     result = np.zeros(phase.shape, np.int8)
-    result[:-1, :-1] = turns(right[:-1] + up[:, 1:] - right[1:] - up[:, :-1])
+    result[:-1, :-1] = np.nan_to_num(turns(right[:-1] + up[:, 1:] - right[1:] - up[:, :-1]))
     return result
 
 
@@ -88,61 +90,71 @@ def _single_thread() -> None:
         whirlwind.set_num_threads(1)
 
 
-def _whirlwind(values: Complexes, coherence: Floats, looks: float) -> Floats:
+def _whirlwind(values: Complexes, coherence: Floats, looks: float, known: Flags) -> Floats:
     import whirlwind
 
     _single_thread()
-    # Low coherence rather than a mask: a mask would split the scene into pieces of unknown level.
+    # Low coherence rather than a mask where there is a phase: a mask would split the scene into
+    # pieces of unknown level.
     unwrapped, _ = whirlwind.unwrap(
         np.ascontiguousarray(values, np.complex64),
         np.ascontiguousarray(np.maximum(coherence, 1e-3), np.float32),
         looks,
-        mask=np.ones(values.shape, bool),
-        # Nothing is masked, so there is nothing to bridge, and its components are not used.
+        mask=known,
+        # The pieces' levels are the height reference's to tell, and its components are not used.
         bridge=False,
         conncomp_algorithm="linear",
     )
     return unwrapped
 
 
-def _skimage(values: Complexes, coherence: Floats, looks: float) -> Floats:
+def _skimage(values: Complexes, coherence: Floats, looks: float, known: Flags) -> Floats:
     del coherence, looks  # It weighs paths by the phase itself.
     from skimage.restoration import unwrap_phase
 
-    return np.asarray(unwrap_phase(np.angle(values).astype(float), rng=0))
+    phase = np.angle(values).astype(float)
+    masked = phase if known.all() else np.ma.masked_array(phase, ~known)
+    return np.asarray(unwrap_phase(masked, rng=0))
 
 
-def _kamui(values: Complexes, coherence: Floats, looks: float) -> Floats:
+def _kamui(values: Complexes, coherence: Floats, looks: float, known: Flags) -> Floats:
     del looks
     import kamui
 
     # Whole numbers let it take its network solver.
     weights = np.rint(1 + 99 * coherence).astype(int)
-    unwrapped = kamui.unwrap_dimensional(
-        np.angle(values).astype(float), method="ilp", weights=weights
+    edges, cells = kamui.get_2d_edges_and_simplices(values.shape)
+    # A cut beside a pixel without a phase costs nothing.
+    weights = np.where(known.ravel()[edges].all(axis=1), weights.ravel()[edges].sum(axis=1), 0)
+    unwrapped = kamui.unwrap_arbitrary(
+        np.angle(values).astype(float).ravel(), edges, cells, method="ilp", weights=weights
     )
     if unwrapped is None:
         raise ValueError("kamui found no unwrapping; try `unwrapping.method: whirlwind`")
-    return np.asarray(unwrapped)
+    return np.asarray(unwrapped).reshape(values.shape)
 
 
-def _snaphu(values: Complexes, coherence: Floats, looks: float) -> Floats:
+def _snaphu(values: Complexes, coherence: Floats, looks: float, known: Flags) -> Floats:
     try:
         import snaphu
     except ImportError:
         raise ValueError(_NO_SNAPHU) from None
     unwrapped, _ = snaphu.unwrap(
-        values.astype(np.complex64), coherence.astype(np.float32), nlooks=looks, cost="smooth"
+        values.astype(np.complex64),
+        coherence.astype(np.float32),
+        nlooks=looks,
+        cost="smooth",
+        mask=None if known.all() else known,
     )
     return np.asarray(unwrapped)
 
 
-def _baselines(values: Complexes, coherence: Floats, looks: float) -> Floats:
-    del coherence, looks  # The shorter baselines tell all of it (`vinsar.processing.cycles`).
+def _baselines(values: Complexes, coherence: Floats, looks: float, known: Flags) -> Floats:
+    del coherence, looks, known  # The shorter baselines tell all of it (`cycles`).
     return np.angle(values).astype(float)
 
 
-UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float], Floats]] = {
+UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float, Flags], Floats]] = {
     "whirlwind": _whirlwind,
     "skimage": _skimage,
     "kamui": _kamui,
@@ -171,6 +183,9 @@ def unwrap(
 ) -> xr.Dataset:
     """Unwrap the filtered phase.
 
+    A pixel that is zero or not finite has no phase. Such pixels may leave islands: each has its own
+    level, which `height.phase_offset` takes from the reference on it.
+
     Parameters
     ----------
     filtered
@@ -185,7 +200,7 @@ def unwrap(
     Returns
     -------
     xarray.Dataset
-        Product ``unwrapped``.
+        Product ``unwrapped``; NaN where there is no phase, and nowhere else.
 
     Raises
     ------
@@ -195,17 +210,42 @@ def unwrap(
     if method not in UNWRAPPERS:
         raise ValueError(f"no unwrapper '{method}'; there are {', '.join(UNWRAPPERS)}")
     values = filtered["interferogram"].values
-    wrapped = np.angle(values).astype(float)
-    unwrapped = UNWRAPPERS[method](values, coherence.values, looks).astype(float)
-    # Solvers work in single precision and from any level: keep only their whole cycles.
-    added = unwrapped - wrapped
-    level = np.angle(np.exp(1j * added).mean())
-    cycles = np.rint((added - level) / (2 * np.pi))
+    known = np.isfinite(values) & (values != 0)
+    wrapped = np.where(known, np.angle(values), np.nan).astype(float)
+    if known.any():
+        added = _solve(wrapped, known, values, coherence.values, method, looks) - wrapped
+        # Solvers work in single precision and from any level: keep only their whole cycles.
+        level = np.angle(np.exp(1j * added[known]).mean())
+        cycles = np.rint((added - level) / (2 * np.pi))
+    else:
+        cycles = wrapped
     return variables.dataset(
         "unwrapped",
         {"phase": wrapped + 2 * np.pi * cycles, "residue": residues(wrapped)},
         {"x": filtered["x"].values, "y": filtered["y"].values},
     )
+
+
+def _solve(
+    wrapped: Floats, known: Flags, values: Complexes, coherence: Floats, method: str, looks: float
+) -> Floats:
+    """Return the phase as the solver unwraps it, from any level (y, x), rad."""
+    if min(wrapped.shape) == 1 and method != "baselines":
+        return _along_a_line(wrapped, known)
+    if not known.all():
+        values = np.where(known, values, 1)
+        coherence = np.where(known, np.nan_to_num(coherence), 0)
+    return UNWRAPPERS[method](values, coherence, looks, known).astype(float)
+
+
+def _along_a_line(wrapped: Floats, known: Flags) -> Floats:
+    """Unwrap a single row or column, on which there is one path and no residue (Itoh 1982)."""
+    result = wrapped.copy()
+    numbers, count = masks.islands(known)
+    for number in range(1, count + 1):
+        part = numbers == number
+        result[part] = np.unwrap(wrapped[part])
+    return result
 
 
 def _unwrapped(products: Products, study: Study) -> xr.Dataset:
