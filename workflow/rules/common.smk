@@ -10,10 +10,10 @@ from vinsar import report as study_report
 from vinsar.evaluation import detection_accuracy
 from vinsar.foundations.errors import ConfigurationError
 from vinsar.paper import claims, likeness
-from vinsar.prediction import systems
+from vinsar.prediction import design, systems
 from vinsar.results import provenance
 from vinsar.simulation.scene import ELEVATION
-from vinsar.study import composition, ingest, pipeline, validation, work
+from vinsar.study import composition, ingest, pipeline, work
 from vinsar.sweeps import sweep
 
 try:
@@ -26,9 +26,9 @@ try:
 except ConfigurationError as error:
     raise WorkflowError(str(error)) from None
 
-for sentence in validation.advice(STUDY):
-    logger.warning(f"Configuration: {sentence}")
 if workflow.is_main_process:
+    for sentence in design.Sheet(STUDY).warnings():
+        logger.warning(f"Configuration: {sentence}")
     logger.info(f"Work: {work.sentence(STUDY)}")
 
 

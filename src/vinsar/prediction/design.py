@@ -20,7 +20,7 @@ from vinsar.foundations.constants import AXES
 from vinsar.processing import filtering
 from vinsar.radar import aperture, grid, instrument, speckle, trajectory
 from vinsar.radar.instrument import Instrument
-from vinsar.study import validation
+from vinsar.study import validation, work
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -770,6 +770,7 @@ def as_markdown(sheet: Sheet) -> str:
         f"- {sheet.samples} complex samples a scan of {sheet.scan_duration:.3g} s, "
         f"{megabytes:.2f} MB in single precision; the vehicle drives "
         f"{study.vehicle.forward_speed_m_per_s * sheet.scan_duration:.2f} m in it",
+        f"- work: {work.sentence(study)}",
         "",
         f"At x = {sheet.x:g} m, for relief and obstacles of {sheet.relief:g} m:",
         "",
