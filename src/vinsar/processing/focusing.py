@@ -40,6 +40,9 @@ _POSITIONS_PER_BLOCK = 128
 # Slant range by which the profiles exceed the image: position errors shall not need new ones.
 _PROFILE_MARGIN_M = 0.5
 
+# They begin at a multiple of this: so positions that differ a little give images of the same bits.
+_PROFILE_STEP_M = 0.5
+
 variables.declare(
     "profiles",
     {
@@ -356,10 +359,12 @@ def _profiles(products: Products, study: Study) -> xr.Dataset:
     frequency = products["received"]["frequency"].values
     step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
     # Of ranges that repeat, none is needed twice.
-    margin = min(_PROFILE_MARGIN_M, 0.49 * (waveform.unambiguous_range(step) - far + near))
+    repeated = waveform.unambiguous_range(step)
+    margin = min(_PROFILE_MARGIN_M, 0.49 * (repeated - far + near))
+    begin = _PROFILE_STEP_M * np.floor((near - margin) / _PROFILE_STEP_M)
     return compress(
         leakage.suppress(products["received"], **study.suppression.model_dump()),
-        near_range_m=max(0.0, near - margin),
+        near_range_m=max(0.0, float(begin), far + margin - repeated),
         far_range_m=far + margin,
         window=study.imaging.range_window,
         oversampling=study.imaging.oversampling,
