@@ -25,7 +25,10 @@ NAMES = list(figures.FIGURES)
 # What is drawn by code of its own: the panels of a sheet are drawn like the sheet.
 SHEETS = [name for name in NAMES if not figures.FIGURES[name].sheet]
 OF_SWEEPS = [name for name in NAMES if figures.FIGURES[name].sweeps]
-SLIDE_MM = 338.7
+# Half as wide as the others: the panels of the chain's sheet, and what shows one curve.
+NARROW = {*(f"fig3{letter}" for letter in "abcdefgh"), "snr", "design_check"}
+# The front sheet is a slide, whatever the journal's columns and text are.
+SLIDES = {"summary": 338.7}
 
 
 def test_every_module_of_the_folder_declares_figures_that_read_what_there_is(study):
@@ -55,7 +58,7 @@ def test_a_name_that_two_modules_declare_is_refused():
 def test_figure_is_readable_and_takes_what_it_declares(usual, check_readable, name):
     figure = usual(name)
     width, height = figure.get_size_inches() * style.MM_PER_INCH
-    assert any(width == pytest.approx(usual) for usual in (88, 180, SLIDE_MM))
+    assert width == pytest.approx(SLIDES.get(name, 88 if name in NARROW else 180))
     assert height < 247  # fits on a page of A4 with its caption
     check_readable(figure)
 
@@ -75,15 +78,11 @@ def test_figure_has_the_width_and_the_text_asked_for_and_stays_readable(
     asked = study.model_copy(update={"figures": study.figures.model_copy(update=look)})
     validation.check(make_study(figures=look).model_dump(mode="json"))
     before, figure = usual(name), draw(name, products, asked)
-    usual_mm = before.get_figwidth() * 25.4
     shape = before.get_figheight() / before.get_figwidth()
-    if usual_mm == pytest.approx(SLIDE_MM):
-        # A slide stays one, whatever the journal's columns and text are.
-        width, scale = usual_mm, 1.0
-    else:
-        narrow = usual_mm == pytest.approx(88)
-        width = asked.figures.one_column_mm if narrow else asked.figures.two_columns_mm
-        scale = asked.figures.font_size_pt / study.figures.font_size_pt
+    width = asked.figures.one_column_mm if name in NARROW else asked.figures.two_columns_mm
+    scale = asked.figures.font_size_pt / study.figures.font_size_pt
+    if name in SLIDES:
+        width, scale = SLIDES[name], 1.0
     assert figure.get_size_inches() * 25.4 == pytest.approx([width, shape * width])
     check_readable(figure)
     expected = [round(size * scale, 3) for size in sizes(before)]
