@@ -51,11 +51,11 @@ def test_every_study_of_ours_is_read_as_pyyaml_reads_it():
     ],
 )
 def test_a_key_that_stands_there_twice_is_refused(load, content, line, column):
-    refused(load, content, "stands there twice, first in line", line=line, column=column)
+    refused(load, content, "is given twice, first in line", line=line, column=column)
 
 
 def test_a_key_that_stands_there_twice_in_json_is_refused(load):
-    refused(load, '{"seed": 1, "radar": {}, "seed": 2}', "the key 'seed' stands there twice")
+    refused(load, '{"seed": 1, "radar": {}, "seed": 2}', "the key 'seed' is given twice")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Configuration files, read so that nothing is lost and nothing is guessed.
 
-PyYAML, which Snakemake reads with as well, keeps to YAML 1.1: of a key that stands there twice it
+PyYAML, which Snakemake reads with as well, keeps to YAML 1.1: of a key that is given twice it
 drops the first, `0401` is 257 to it, `1:30` is 90 and `1e9` is text. What YAML 1.1 and 1.2 read
 differently is refused here, so that a file means the same to its author and to every reader.
 """
@@ -141,7 +141,7 @@ def _json(path: Path, text: str) -> Any:
         found: dict[str, Any] = {}
         for key, value in pairs:
             if key in found:
-                raise FileError(path, f"the key '{key}' stands there twice in one place")
+                raise FileError(path, f"the key '{key}' is given twice in one place")
             found[key] = value
         return found
 
@@ -265,7 +265,7 @@ def _of_mapping(node: Any) -> Iterator[tuple[str, Any]]:
             yield f"{told}; a key is text (put it in quotes, if it is meant so)", key.start_mark
         elif key.value in seen:
             first = seen[key.value]
-            yield f"the key '{key.value}' stands there twice, first in line {first}", key.start_mark
+            yield f"the key '{key.value}' is given twice, first in line {first}", key.start_mark
         else:
             seen[key.value] = key.start_mark.line + 1
 

@@ -177,6 +177,8 @@ def read(path: str | Path, product: str | None = None) -> xr.Dataset:
     if product is None or found != product:
         wanted = f"'{product}'" if product else "a product of this version"
         raise ValueError(f"{path} holds {found}, not {wanted}; {remedy}")
+    if product not in variables.PRODUCTS:
+        raise ValueError(f"no module that is imported declares a product '{product}'")
     try:
         data = _restore(stored, product)
         variables.check(data, product)

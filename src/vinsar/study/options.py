@@ -23,7 +23,7 @@ class Reflector(Section):
 
 
 class Measurement(Section, name="measurement"):
-    """Echoes of your own in place of simulated ones (docs/own-data.md)."""
+    """Your own echoes in place of simulated ones (docs/own-data.md)."""
 
     file: str | None = key(
         "netCDF file of measured echoes; paths begin in the repository's folder. The section "

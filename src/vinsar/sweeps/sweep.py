@@ -255,7 +255,7 @@ def cases(study: Study, name: str, *given: str) -> list[Case]:
 
 
 def _refuse_idle(study: Study, name: str) -> None:
-    """Refuse swept keys that no stage of a case reads, and values that stand there twice."""
+    """Refuse swept keys that no stage of a case reads, and values that are listed twice."""
     faults = []
     read = [f"{key}." for key in declared(study, name)]
     for key, values in study.sweeps[name].over.items():
