@@ -272,6 +272,7 @@ def put(name, index, value):
         (lambda data: data.isel(x=slice(1)), "variable 'x' has 1 value"),
         (scaled("height", 10), "rises to 3.20 m above the ground plane"),
         (scaled("height", -10), "reflectivity falls to"),
+        (lambda data: data.assign(reflectivity=0 * data["height"]), "0 all over the scene"),
         (lambda data: data.assign(height=data["height"].astype(str)), "real numbers are needed"),
     ],
 )

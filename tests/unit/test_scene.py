@@ -321,3 +321,12 @@ def test_walls_have_facets_by_their_surface_and_gentle_ground_by_its_area(peaks)
     assert facing.mean() == pytest.approx(0.15, abs=4 * 0.26 / np.sqrt(12 * facing.size))
     # Nothing of the peaks is a wall: one facet a cell.
     assert cut(peaks, 1.0).sizes["facet"] == 167 * 200
+
+
+@pytest.mark.parametrize(
+    ("height", "reflectivity"), [(np.full((2, 3), -0.4), None), (np.ones((2, 3)), np.zeros((2, 3)))]
+)
+def test_terrain_that_returns_no_echo_is_refused(height, reflectivity):
+    x, y = np.arange(3.0), np.arange(2.0)
+    with pytest.raises(ValueError, match="0 all over the scene"):
+        scene.from_heights(x, y, height, reflectivity, reflectivity_offset=0.4)

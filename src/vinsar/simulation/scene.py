@@ -187,7 +187,7 @@ def from_heights(
     Raises
     ------
     ValueError
-        If a reflectivity would be negative.
+        If a reflectivity would be negative, or all of it is zero.
     """
     if reflectivity is None:
         reflectivity = height + reflectivity_offset
@@ -198,6 +198,11 @@ def from_heights(
                 f"scene.reflectivity_offset; take an offset of {-height.min():.3f} or more, give "
                 "the file a 'reflectivity' of its own, or correct scene.ground_height_m"
             )
+    if not reflectivity.max() > 0:
+        raise ValueError(
+            "its reflectivity is 0 all over the scene, so that nothing returns an echo; give the "
+            "file another, or take scene.file_reflectivity 'constant'"
+        )
     return variables.dataset(
         "elevation", {"height": height, "reflectivity": reflectivity}, {"x": x, "y": y}
     )
