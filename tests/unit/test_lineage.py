@@ -1,5 +1,7 @@
 import json
 
+import numpy as np
+import psutil
 import pytest
 
 from vinsar.results import lineage
@@ -41,6 +43,14 @@ def test_a_record_tells_when_a_job_began_and_ended(study):
     assert record["started"] == "1970-01-01T00:00:01.500+00:00"
     assert record["ended"] == "1970-01-01T00:00:03.750+00:00"
     assert (record["job"], record["threads"]) == ("dem", 2)
+
+
+def test_a_record_tells_the_peak_of_memory(study):
+    held = np.ones(2**24)
+    (record,) = lineage.read_records(study("a", {"dem": ({}, {})})).values()
+    # The peak is of the process so far, whatever has been given back since.
+    assert record["peak_bytes"] >= psutil.Process().memory_info().rss - 2**20
+    assert record["peak_bytes"] > held.nbytes
 
 
 def test_a_stage_of_other_code_is_found_though_later_stages_agree(study):

@@ -631,20 +631,24 @@ def _times(sources: Sources) -> Section | None:
             f"{taken[name]:.2f}",
             f"{100 * taken[name] / total:.1f}" if total else "",
             str(max(record.get("threads", 1) for record in records)),
+            _size(max(record.get("peak_bytes", 0) for record in records)),
             str(len(records)),
             _size(sum(record["bytes"] for record in records)),
         )
         for name, records in ordered
     ]
-    rows.append(("all", f"{total:.2f}", "", "", str(len(sources.records)), ""))
+    rows.append(("all", f"{total:.2f}", "", "", "", str(len(sources.records)), ""))
     table = Table(
         "times",
-        ("job", "seconds", "share (%)", "threads", "files", "size"),
-        "lrrrrr",
-        (1, 0, 0, 0, 0, 0),
+        ("job", "seconds", "share (%)", "threads", "peak memory", "files", "size"),
+        "lrrrrrr",
+        (1, 0, 0, 0, 0, 0, 0),
         tuple(rows),
     )
-    text = "How long each job took when its results were made, in the order in which they began."
+    text = (
+        "How long each job took when its results were made, in the order in which they began, and "
+        "the most memory that one of its processes held."
+    )
     return Section("times", "Stage times", (Text(text), table))
 
 

@@ -11,6 +11,7 @@ import json
 import os
 import platform
 import re
+import resource
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -85,6 +86,7 @@ def write_record(
         "started": _instant(started),
         "ended": _instant(started + seconds),
         "seconds": round(seconds, 3),
+        "peak_bytes": _peak_bytes(),
         "host": platform.node(),
         "platform": platform.platform(),
         "python": platform.python_version(),
@@ -93,6 +95,15 @@ def write_record(
     text = json.dumps(signed(record), indent=2, sort_keys=True) + "\n"
     with storage.atomic(_record_of(folder, relative.as_posix())) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _peak_bytes() -> int:
+    """Return the most memory that this process, or one that it started, has held at a time.
+
+    Snakemake's benchmarks sample a job, and miss short peaks.
+    """
+    whose = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN
+    return 1024 * max(resource.getrusage(one).ru_maxrss for one in whose)
 
 
 def signed(record: Mapping[str, Any]) -> dict[str, Any]:
