@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vinsar.readers import files
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -68,8 +70,6 @@ _SCALE_TOLERANCE = 2e-3
 
 # Fewer nodes than this along the scene are hardly its relief.
 _FEWEST_STEPS = 2.0
-
-_UNEVEN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -473,22 +473,7 @@ def _even(stored: xr.Dataset, name: str) -> Floats:
     if stored[name].dims != (name,) or stored[name].dtype.kind not in "fiu":
         raise ValueError(f"variable '{name}' is not an axis of numbers")
     values = np.asarray(stored[name].values, dtype=float)
-    if values.size < 2:
-        raise ValueError(f"variable '{name}' has {values.size} value; two or more are needed")
-    if not np.isfinite(values).all():
-        count = int((~np.isfinite(values)).sum())
-        raise ValueError(f"variable '{name}' has {count} values that are missing or not finite")
-    steps = np.diff(values)
-    if not (np.all(steps > 0) or np.all(steps < 0)):
-        raise ValueError(f"variable '{name}' is not sorted; sort it, and the data along it")
-    step = (values[-1] - values[0]) / steps.size
-    off = float(np.abs(steps / step - 1).max())
-    if off > _UNEVEN:
-        raise ValueError(
-            f"variable '{name}' is uneven: its steps differ by up to {100 * off:.3g} % from "
-            f"{abs(step):g}; resample to even steps (and store it in double precision)"
-        )
-    return values
+    return files.even(name, values)
 
 
 def _affine(axes: _Axes) -> tuple[float, ...]:

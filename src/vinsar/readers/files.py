@@ -21,6 +21,44 @@ if TYPE_CHECKING:
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
+# Steps may differ by this share of themselves: a thousandth of a frequency step turns the phase by
+# 6 mrad at the far end of the unambiguous range.
+_UNEVEN = 1e-3
+
+
+def even(name: str, values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the values of an axis if they rise or fall in even steps.
+
+    Parameters
+    ----------
+    name
+        Name of the variable, for the message.
+    values
+        Its values (n,).
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two, some are not finite, or they are not sorted or not even.
+    """
+    if values.size < 2:
+        raise ValueError(f"variable '{name}' has {values.size} value; two or more are needed")
+    if not np.isfinite(values).all():
+        count = int((~np.isfinite(values)).sum())
+        raise ValueError(f"variable '{name}' has {count} values that are missing or not finite")
+    steps = np.diff(values)
+    if not (np.all(steps > 0) or np.all(steps < 0)):
+        raise ValueError(f"variable '{name}' is not sorted; sort it, and the data along it")
+    step = (values[-1] - values[0]) / steps.size
+    off = float(np.abs(steps / step - 1).max())
+    if off > _UNEVEN:
+        raise ValueError(
+            f"variable '{name}' is uneven: its steps differ by up to {100 * off:.3g} % from "
+            f"{abs(step):g}; resample to even steps (and store it in double precision)"
+        )
+    return values
+
+
 def load(path: str | Path) -> tuple[Arrays, dict[str, str]]:
     """Read all arrays of a file.
 

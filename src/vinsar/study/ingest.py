@@ -18,6 +18,7 @@ from vinsar.foundations.constants import AXES, channel_names
 from vinsar.foundations.errors import ConfigurationError, Fault
 from vinsar.radar import geometry, grid, trajectory, waveform
 from vinsar.readers import elevation as surveyed
+from vinsar.readers import files
 from vinsar.simulation import scene
 from vinsar.study import validation
 
@@ -37,10 +38,6 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 _HERTZ = ("Hz", "hertz", "Hertz", "s-1", "1/s")
-
-# Steps may differ by this share of themselves: a thousandth of a frequency step turns the phase by
-# 6 mrad at the far end of the unambiguous range.
-_UNEVEN = 1e-3
 
 # Positions whose number is correlated with their x by less than this are not in order; of a cart
 # that is pushed in jerks it is 0.95 and more.
@@ -456,20 +453,7 @@ def _refuse_unknown(name: str, values: Floats) -> None:
 def _even(stored: xr.Dataset, name: str, units: tuple[str, ...]) -> Floats:
     """Return an axis that rises or falls in even steps."""
     values = _values(stored, name, (name,), units)
-    if values.size < 2:
-        raise ValueError(f"variable '{name}' has {values.size} value; two or more are needed")
-    _refuse_unknown(name, values)
-    steps = np.diff(values)
-    if not (np.all(steps > 0) or np.all(steps < 0)):
-        raise ValueError(f"variable '{name}' is not sorted; sort it, and the data along it")
-    step = (values[-1] - values[0]) / steps.size
-    off = float(np.abs(steps / step - 1).max())
-    if off > _UNEVEN:
-        raise ValueError(
-            f"variable '{name}' is uneven: its steps differ by up to {100 * off:.3g} % from "
-            f"{abs(step):g}; resample to even steps (and store it in double precision)"
-        )
-    return values
+    return files.even(name, values)
 
 
 def _labels(stored: xr.Dataset, name: str) -> list[Any]:
