@@ -24,10 +24,6 @@ if "elevation" in pipeline.from_files(STUDY):
 
 if STUDY.measurement.file is not None:
 
-    ruleorder: measurement > received
-    ruleorder: measurement > trajectory
-    ruleorder: measurement > recorded_trajectory
-
     rule measurement:
         input:
             file=STUDY.measurement.file,

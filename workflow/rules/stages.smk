@@ -1,6 +1,8 @@
 # The stages of the chain: a rule each, made from what the stages declare.
 
-for NAME in composition.STAGES:
+for NAME in [
+    name for name in composition.STAGES if name not in pipeline.from_files(STUDY)
+]:
 
     rule:
         name:
