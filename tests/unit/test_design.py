@@ -248,6 +248,11 @@ def test_upright_objects_of_more_than_half_a_cycle_are_warned_of(shape, height):
         ({"echo": {"snr_db": -10.0}}, "fewer than 95 %"),
         ({"radar": {"baseline_m": 1.0}}, "less than half the relief"),
         ({"radar": {"baseline_m": 2.5}}, "a quarter of the critical baseline"),
+        ({"radar": {"baselines_m": [0.2, 0.3]}}, "wrap the phase of the shortest one"),
+        (
+            {"radar": {"baselines_m": [0.01, 0.3]}, "echo": {"snr_db": 5.0}},
+            "the noise of 0.01 m leaves cycles of 0.3 m open",
+        ),
     ],
 )
 def test_what_is_unwise_is_said(changes, words):
@@ -272,6 +277,24 @@ def test_every_shipped_study_has_a_sheet(path):
     assert "-0.000" not in text
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len(rows) > 20
+
+
+def test_a_short_baseline_ends_the_warning_of_upright_objects():
+    scene = {"terrain": "flat", "objects": [BOX | {"height_m": 0.5}]}
+    words = "half the height of ambiguity"
+    assert any(words in line for line in sheet_of(scene=scene).warnings())
+    recommended = sheet_of(scene=scene).settling_baselines(0.5)
+    assert len(recommended) == 2
+    helped = sheet_of(scene=scene, radar={"baselines_m": list(recommended)})
+    told = [line for line in helped.warnings() if words in line or "baselines_m" in line]
+    assert told == []
+
+
+def test_the_sheet_gives_each_baseline_its_ambiguity_and_recommends_some():
+    text = design.as_markdown(sheet_of(radar={"baselines_m": [0.06, 0.3]}))
+    # lambda r2 / 2B at 10 m: 0.02141 x hypot(10, 2.06) / 0.12.
+    assert "| the same of 0.06 m (m) | 1.822 |" in text
+    assert "| 0.5 | 0.101, 0.3 |" in text
 
 
 def test_the_sheet_of_the_paper_names_its_figures():

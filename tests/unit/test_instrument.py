@@ -129,6 +129,58 @@ def test_looks_are_resolution_cells_and_never_fewer_than_one():
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("factor", [0.2, 3.0])
+def test_a_scaled_baseline_is_one_of_that_length(system, factor):
+    scaled = planned(system=system, baseline_angle_deg=70.0).scaled(factor)
+    built = planned(system=system, baseline_angle_deg=70.0, baseline_m=0.3 * factor)
+    for end in ("transmitter", "receiver"):
+        np.testing.assert_allclose(getattr(scaled.upper, end), getattr(built.upper, end))
+
+
+@pytest.mark.parametrize("height", [0.1, 0.6, 2.0])
+@pytest.mark.parametrize("noise", [0.0, 0.4])
+def test_the_unwrapped_baseline_of_a_rail_is_lambda_r2_over_4_h_less_what_noise_takes(
+    height, noise
+):
+    found = planned().unwrapped_baseline(height, 0.0, np.array([16.0, 10.0]), phase_std=noise)
+    # lambda r2 / 2B = 2 h / (1 - 3 std / pi) at the near place.
+    r2 = np.hypot(10.0, 2.0 + found)
+    assert found == pytest.approx(WAVELENGTH * r2 / (4 * height) * (1 - 3 * noise / np.pi))
+
+
+def test_an_array_s_unwrapped_baseline_has_twice_the_height_of_ambiguity_of_the_objects():
+    radar = planned(system="transmit_pair")
+    length = radar.unwrapped_baseline(0.8, 0.5, 12.0)
+    built = planned(system="transmit_pair", baseline_m=length)
+    assert float(built.height_of_ambiguity(0.5, 12.0)) == pytest.approx(1.6)
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.2, 0.35])
+def test_settling_baselines_rise_to_the_longest_and_each_settles_the_next(noise):
+    found = planned(baseline_m=0.9).settling_baselines(1.5, 0.0, 12.0, phase_std=noise)
+    assert found[-1] == pytest.approx(0.9)
+    short = planned().unwrapped_baseline(1.5, 0.0, 12.0, phase_std=noise)
+    assert found[0] == pytest.approx(short, rel=1e-6)
+    ratios = np.divide(found[1:], found[:-1])
+    # One draw in a thousand of either phase is beyond 3.3 deviations.
+    assert (3 * noise * np.hypot(1, ratios) < np.pi).all()
+    # One antenna fewer would not do.
+    fewer = (found[-1] / found[0]) ** (1 / max(len(found) - 2, 1))
+    assert len(found) == 2 or 3 * noise * np.hypot(1, fewer) >= np.pi
+
+
+def test_low_objects_need_no_further_antenna_and_noise_leaves_none():
+    assert planned().settling_baselines(0.1, 0.0, 12.0) == pytest.approx((0.3,))
+    assert planned().settling_baselines(0.6, 0.0, 12.0, phase_std=0.8) == ()
+    assert planned().settling_baselines(0.6, 0.0, 12.0, phase_std=1.2) == ()
+
+
+def test_objects_without_a_height_are_refused():
+    with pytest.raises(ValueError, match="have no height"):
+        planned().settling_baselines(0.0, 0.0, 12.0)
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
 def test_report_sheet_and_figure_show_the_same_values(system):
     study = validation.check(
         validation.merge(

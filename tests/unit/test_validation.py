@@ -462,6 +462,14 @@ def test_measured_echoes_have_no_scene_to_be_wrong():
     assert "scene.facet_size_m" in faults(raw | {"measurement": {"file": None}})
 
 
+def test_a_sweep_of_the_baseline_keeps_the_antennas_that_stay_below_the_upper_one():
+    sweep = {"realizations": 1, "base": {}, "over": {"radar.baseline_m": [0.05, 0.1, 0.5]}}
+    raw = changed(radar__baselines_m=[0.06, 0.2, 0.3], sweeps={"length": sweep})
+    found = [case.radar for _, case in validation.sweep_studies(validation.check(raw), "length")]
+    assert [radar.baselines for radar in found] == [(0.05,), (0.06, 0.1), (0.06, 0.2, 0.5)]
+    assert [radar.baseline_m for radar in found] == [0.05, 0.1, 0.5]
+
+
 def test_sweeps_and_variants_keep_to_the_one_file_of_a_terrain():
     sweep = {"realizations": 1, "base": {}, "over": {"scene.x_max_m": [2.5, 2.0]}}
     raw = changed(

@@ -50,10 +50,7 @@ def draw(products: Products, study: Study) -> Figure:
     radar = swept_section(study, name, "radar")
     place = instrument.middle(swept_section(study, name, "scene"))
     quarter = float(instrument.Instrument.planned(radar).critical_baseline(*place)) / 4
-    planned = [
-        instrument.Instrument.planned(radar.model_copy(update={"baseline_m": float(value)}))
-        for value in length
-    ]
+    planned = [instrument.Instrument.planned(radar.with_baseline(float(value))) for value in length]
     ambiguity = np.array([float(part.height_of_ambiguity(*place)) for part in planned])
     theory = np.array([float(part.geometric_coherence(*place)) for part in planned])
     height = 88.0

@@ -12,6 +12,7 @@ from vinsar.foundations import variables
 from vinsar.foundations.configuration import swept_section
 from vinsar.foundations.constants import AXES
 from vinsar.prediction import design
+from vinsar.radar import trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,8 +123,11 @@ def _by_noise(products: Products, study: Study) -> tuple[Floats, Floats]:
 
 def _by_baseline(products: Products, study: Study) -> tuple[Floats, Floats]:
     sweep = variables.swept(products["sweeps/baseline_length"], "radar_baseline_m")
+    kept = swept_section(study, "baseline_length", "radar").baselines_m
     predicted = [
-        _sheet(study, "baseline_length", radar={"baseline_m": float(length)}).scene_height_std()
+        _sheet(
+            study, "baseline_length", radar=trajectory.longest(float(length), kept)
+        ).scene_height_std()
         for length in sweep["radar_baseline_m"].values
     ]
     return np.array(predicted), _spread(sweep)

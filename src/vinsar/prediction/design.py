@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,6 +62,9 @@ _SAME_M = 1e-9
 
 # Objects with vertical sides.
 _UPRIGHT = ("box", "stump", "ditch", "pit")
+
+# Heights of upright objects for which antennas are recommended, m.
+_OBJECTS_M = (0.25, 0.5, 1.0, 2.0)
 
 # Errors tried for a tolerance, as shares of the largest.
 _SIZES = np.geomspace(1e-3, 1.0, 13)
@@ -405,6 +409,38 @@ class Sheet:
         within = norm.cdf((most - bias) / std) - norm.cdf((-most - bias) / std)
         return float(within.mean())
 
+    def pairs(self) -> dict[float, Instrument]:
+        """Return the lower antenna with each other one, by the length of the baseline in m."""
+        part = self.study.radar
+        return {
+            length: Instrument.planned(part.model_copy(update=trajectory.longest(length, None)))
+            for length in part.baselines
+        }
+
+    def phase_std(self) -> float:
+        """Return the standard deviation of the filtered phase where it is largest, rad."""
+        coherence = self.coherence(self.places)
+        return float(speckle.phase_std(coherence, self.looks(self.places, coherence)).max())
+
+    def settling_baselines(self, height_m: float) -> tuple[float, ...]:
+        """Return the baselines that tell upright objects of a height, near and far, m.
+
+        Parameters
+        ----------
+        height_m
+            Height of the objects, or depth, m.
+
+        Returns
+        -------
+        tuple of float
+            Lengths, rising (`Instrument.settling_baselines`).
+        """
+        found = self.instrument.settling_baselines(
+            height_m, self.x, self.places, phase_std=self.phase_std()
+        )
+        # The longest as it is configured, not as a distance of antennas.
+        return (*found[:-1], self.study.radar.baseline_m) if found else ()
+
     def shadow_length(self, y: ArrayLike) -> Floats:
         """Return how far an obstacle as high as the scene's relief hides the ground behind it, m.
 
@@ -697,23 +733,52 @@ class Sheet:
                 f"scene: the images of a target as high as the relief, {self.relief:g} m, "
                 f"differ by {share:.2f} of a resolution cell, more than a tenth"
             )
-        cycle, relief = float(planned.height_of_ambiguity(self.x, y).min()), self.relief
+        shortest, pair = next(iter(self.pairs().items()))
+        cycle, relief = float(pair.height_of_ambiguity(self.x, y).min()), self.relief
         if relief > 2 * cycle:
             found.append(
-                f"radar.baseline_m = {self.study.radar.baseline_m}: the height of ambiguity, "
+                f"radar.baseline_m = {shortest}: the height of ambiguity, "
                 f"{cycle:.2f} m, is less than half the relief of {relief:g} m: steps of half of it "
                 "unwrap wrongly"
             )
+        found += self._unsettled()
         found += self._ambiguous_objects()
         return found
 
+    def _unsettled(self) -> list[str]:
+        """Return what keeps shorter baselines from settling the cycle of the longer ones."""
+        lengths = self.study.radar.baselines
+        if len(lengths) < 2:
+            return []
+        found, noise = [], self.phase_std()
+        needed = self.instrument.unwrapped_baseline(
+            self.relief, self.x, self.places, phase_std=noise
+        )
+        where = f"radar.baselines_m = {list(lengths)}"
+        if lengths[0] > needed:
+            found.append(
+                f"{where}: relief and obstacles of {self.relief:g} m wrap the phase of the "
+                f"shortest one; {needed:.3f} m or less would hold them"
+            )
+        for shorter, longer in pairwise(lengths):
+            if not instrument.settles(longer / shorter, noise):
+                found.append(
+                    f"{where}: the noise of {shorter:g} m leaves cycles of {longer:g} m open; "
+                    "place an antenna between"
+                )
+        return found
+
     def _ambiguous_objects(self) -> list[str]:
-        """Return the upright objects whose sides jump by more than half a cycle."""
+        """Return the upright objects whose sides jump by more than half a cycle.
+
+        Of the shortest baseline, which settles the cycles of the others.
+        """
         found = []
+        shortest = next(iter(self.pairs().values()))
         objects = () if self.study.measurement.file is not None else self.study.scene.objects
         for number, item in enumerate(objects):
             size = float(getattr(item, "height_m", getattr(item, "depth_m", 0.0)))
-            half = float(self.instrument.height_of_ambiguity(item.x_m, item.y_m)) / 2
+            half = float(shortest.height_of_ambiguity(item.x_m, item.y_m)) / 2
             if item.shape in _UPRIGHT and size > half:
                 found.append(
                     f"scene.objects[{number}]: a {item.shape} of {size:g} m exceeds half the "
@@ -790,6 +855,10 @@ def as_markdown(sheet: Sheet) -> str:
         ("critical baseline of this attitude (m)", critical, ".2f"),
         ("a quarter of it (m)", critical / 4, ".2f"),
         ("height of ambiguity (m)", planned.height_of_ambiguity(*place), ".3f"),
+        *(
+            (f"the same of {length:g} m (m)", pair.height_of_ambiguity(*place), ".3f")
+            for length, pair in list(sheet.pairs().items())[:-1]
+        ),
         ("coherence of level ground", sheet.coherence(y), ".3f"),
         ("looks of the phase filter", sheet.looks(y, sheet.coherence(y)), ".1f"),
         ("predicted height noise, 1 sigma (cm)", 100 * sheet.height_std(y), ".2f"),
@@ -799,7 +868,18 @@ def as_markdown(sheet: Sheet) -> str:
     table = [(name, *_span(values, form)) for name, values, form in rows]
     lines.append(tables.write(("", "near", "middle", "far"), table, "lrrr"))
     most = 100 * study.accuracy.tolerance_m
+    heights = sorted({sheet.relief, *_OBJECTS_M})
     lines += [
+        "",
+        "Upright objects of a height are told with antennas so far above the lower one "
+        "(radar.baselines_m): the shortest baseline needs no unwrapping, and each settles the next "
+        "one's cycles:",
+        "",
+        tables.write(
+            ("height of the objects (m)", "baselines (m)"),
+            [(f"{height:g}", _lengths(sheet.settling_baselines(height))) for height in heights],
+            "rl",
+        ),
         "",
         f"Constant errors, and which move no height of the image by more than {most:g} cm, before "
         "and after the height reference takes its phase constant:",
@@ -839,6 +919,15 @@ def as_markdown(sheet: Sheet) -> str:
     lines += ["", "Warnings:", ""] if found else ["", "No warnings."]
     lines += [f"- {sentence}" for sentence in found]
     return "\n".join(lines) + "\n"
+
+
+def _lengths(lengths: tuple[float, ...]) -> str:
+    """Return baselines as text, the recommended ones rounded down to millimetres."""
+    *shorter, longest = lengths or (math.nan,)
+    if math.isnan(longest):
+        return "none: the phase is too noisy"
+    floor = [f"{math.floor(1e3 * length) / 1e3:g}" for length in shorter]
+    return ", ".join([*floor, f"{longest:g}"])
 
 
 def _amount(value: float) -> str:

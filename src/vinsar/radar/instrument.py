@@ -10,7 +10,7 @@ without the plane-wave approximation (`vinsar.radar.formulas`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +28,16 @@ if TYPE_CHECKING:
 # Lengths tried for the critical baseline, in units of the baseline.
 _FACTORS = np.geomspace(1e-3, 1e5, 161)
 _BISECTIONS = 50
+
+# Phases err by no more than so many standard deviations: 0.3 % of them do, and the median over a
+# window of pixels takes the rest.
+_SIGMAS = 3.0
+
+# More antennas than this say that noise is the trouble.
+_MOST_STEPS = 8
+
+# Steps to the baseline of a height of ambiguity, which is nearly inverse to it.
+_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -195,6 +205,89 @@ class Instrument:
         """
         return np.abs(self.wavelength * self.height_per_difference(x, y))
 
+    def scaled(self, factor: float) -> Instrument:
+        """Return the instrument with so many times the baseline, in the same attitude."""
+        ends = {
+            name: mine + factor * (getattr(self.upper, name) - mine)
+            for name in ("transmitter", "receiver")
+            for mine in (getattr(self.lower, name),)
+        }
+        return replace(self, upper=replace(self.upper, **ends))
+
+    def unwrapped_baseline(
+        self, height_m: float, x: ArrayLike, y: ArrayLike, *, phase_std: float = 0.0
+    ) -> float:
+        """Return the longest baseline of this attitude that tells objects without unwrapping, m.
+
+        Heights up to `height_m` above or below the reference stay within half a cycle of it: the
+        height of ambiguity is twice `height_m`, and more by what noise takes of the half cycle.
+
+        Parameters
+        ----------
+        height_m
+            Height of the objects, or depth, m.
+        x, y
+            Points, m, of shapes that broadcast; the worst of them counts.
+        phase_std
+            Standard deviation of the filtered phase, rad.
+
+        Returns
+        -------
+        float
+            Length, m; 0 if noise alone takes the half cycle.
+
+        Raises
+        ------
+        ValueError
+            If the height is not positive.
+        """
+        if height_m <= 0:
+            raise ValueError(f"objects of {height_m:g} m have no height to tell: take one above 0")
+        left = 1 - _SIGMAS * phase_std / np.pi
+        if left <= 0:
+            return 0.0
+        factor = 1.0
+        for _ in range(_STEPS):
+            cycle = float(self.scaled(factor).height_of_ambiguity(x, y).min())
+            factor *= cycle * left / (2 * height_m)
+        return factor * self.baseline
+
+    def settling_baselines(
+        self, height_m: float, x: ArrayLike, y: ArrayLike, *, phase_std: float = 0.0
+    ) -> tuple[float, ...]:
+        """Return the baselines, up to this one, that tell upright objects their whole cycles.
+
+        The shortest needs no unwrapping (`unwrapped_baseline`), and each settles the next one's
+        cycles (`settles`).
+
+        Parameters
+        ----------
+        height_m, x, y, phase_std
+            As in `unwrapped_baseline`.
+
+        Returns
+        -------
+        tuple of float
+            Lengths, rising, m; this baseline alone if it is short enough, nothing if the phase is
+            too noisy for any.
+
+        Raises
+        ------
+        ValueError
+            If the height is not positive.
+        """
+        first = self.unwrapped_baseline(height_m, x, y, phase_std=phase_std)
+        if first >= self.baseline:
+            return (self.baseline,)
+        if first == 0 or not settles(1.0, phase_std):
+            return ()
+        ratio, steps = self.baseline / first, 1
+        while not settles(ratio ** (1 / steps), phase_std):
+            steps += 1
+            if steps > _MOST_STEPS:
+                return ()
+        return tuple(self.baseline * ratio ** (step / steps - 1) for step in range(steps + 1))
+
     def random_phase_std(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the standard deviation of the height under a phase that is noise, m.
 
@@ -315,6 +408,22 @@ class Instrument:
 
         widest = 1e4
         return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
+
+
+def settles(ratio: float, phase_std: float) -> bool:
+    """Tell whether a baseline's phase settles the whole cycles of one so many times as long.
+
+    It predicts the longer one's phase with its own error times the ratio, which with the longer
+    one's own must stay within half a cycle: ``3 std sqrt(1 + ratio^2) < pi``.
+
+    Parameters
+    ----------
+    ratio
+        Longer baseline over shorter one.
+    phase_std
+        Standard deviation of the filtered phase of either, rad.
+    """
+    return _SIGMAS * phase_std * math.sqrt(1 + ratio**2) < math.pi
 
 
 def middle(area: Any) -> tuple[float, float]:

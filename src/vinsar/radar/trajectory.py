@@ -102,6 +102,27 @@ class Radar(Section, name="radar"):
         """Distances of all antennas above the lower one, m; the longest is the last."""
         return self.baselines_m or (self.baseline_m,)
 
+    def with_baseline(self, length_m: float) -> Radar:
+        """Return the radar with another longest baseline (`longest`)."""
+        return self.model_copy(update=longest(length_m, self.baselines_m))
+
+
+def longest(length_m: float, baselines_m: Sequence[float] | None) -> dict[str, Any]:
+    """Return the keys of section ``radar`` that change with the longest baseline.
+
+    Parameters
+    ----------
+    length_m
+        The longest baseline, m.
+    baselines_m
+        ``radar.baselines_m`` until now; the antennas below the upper one stay where the new one
+        leaves them below.
+    """
+    if baselines_m is None:
+        return {"baseline_m": length_m, "baselines_m": None}
+    shorter = [other for other in baselines_m[:-1] if other < length_m]
+    return {"baseline_m": length_m, "baselines_m": (*shorter, length_m)}
+
 
 def planned(radar: Radar) -> xr.Dataset:
     """Return the antenna positions of a configuration.

@@ -20,6 +20,7 @@ from vinsar.foundations import strict_yaml
 from vinsar.foundations.configuration import Study, models_in
 from vinsar.foundations.errors import ConfigurationError, Fault
 from vinsar.foundations.text import NAMED_BY
+from vinsar.radar import trajectory
 from vinsar.simulation.scene import ELEVATION, SceneObject
 from vinsar.study import checks, composition, work
 from vinsar.study.composition import StudyModel
@@ -184,6 +185,10 @@ def sweep_studies(study: Study, name: str) -> list[tuple[dict[str, Any], Study]]
         raw: dict[str, Any] = base
         for key, value in changes.items():
             raw = merge(raw, _nested(key, value))
+        # Antennas below the upper one stay when its baseline is swept alone.
+        length, several = changes.get("radar.baseline_m"), raw["radar"]["baselines_m"]
+        if isinstance(length, int | float) and several and "radar.baselines_m" not in changes:
+            raw = merge(raw, {"radar": trajectory.longest(length, several)})
         try:
             case = check(raw)
             _refuse_other_files(case, study)
