@@ -175,7 +175,7 @@ def wanted_products():
         for name in figures.FIGURES[figure].inputs
     }
     if STUDY.outputs.claims:
-        read |= {*claims.INPUTS}
+        read |= {*claims.inputs_of(STAGES)}
     read |= {"dem" if "dem" in STAGES else "images", "accuracy", "focus", "reflectors"}
     return list(pipeline.needed(read.intersection(STAGES), STAGES))
 

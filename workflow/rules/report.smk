@@ -47,7 +47,7 @@ rule detection_summary:
 
 rule claims:
     input:
-        **product_files(*claims.INPUTS),
+        **product_files(*claims.inputs_of(STAGES)),
         **sweep_files(*claims.sweeps_of(STUDY)),
         code=sources_of("paper.claims", script="claims"),
     output:
@@ -165,6 +165,33 @@ rule systems:
         caption=figures.FIGURES["systems"].caption,
     script:
         "../scripts/systems.py"
+
+
+rule registration_summary:
+    input:
+        **product_files("registered"),
+        code=if_made(
+            "registered",
+            sources_of(
+                "evaluation.registered", "paper.claims", script="registration_summary"
+            ),
+        ),
+    output:
+        report(
+            "<results>/registered.md",
+            caption="../report/caption.rst",
+            category="Numbers",
+        ),
+    log:
+        "<logs>/registration_summary.log",
+    benchmark:
+        "<benchmarks>/registration_summary.tsv"
+    params:
+        configuration=configuration(),
+        caption="Coherence, misregistration and heights of images that are registered or not, "
+        "beside images focused on the surface.",
+    script:
+        "../scripts/registration_summary.py"
 
 
 rule likeness:

@@ -17,7 +17,7 @@ from vinsar.processing import detection
 from vinsar.radar import aperture, formulas, geometry, instrument, trajectory
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -45,6 +45,9 @@ INPUTS = (
 SWEEPS = ("vibration",)
 """Sweeps that the claims are decided on; among the products, each is ``sweeps/<name>``."""
 
+REGISTERED = "registered"
+"""Product that decides whether images must be registered; a claim is made of it where there is."""
+
 AUTOFOCUS = "autofocus"
 """Sweep that decides whether y must be measured; a claim is made of it where a study has it."""
 
@@ -61,6 +64,8 @@ PAPER_STD_M = 0.045
 
 # A spread of this share of the relief's own is no better than a DEM of level ground.
 _FAILED_SHARE = 0.9
+# Spread that registration must take away, as a share of it, to be needed.
+_NEEDED = 0.1
 # Growth over the spread without errors that autofocus may leave.
 _KEPT = 1.3
 # Growth that counts as such, beside the scatter of the realizations.
@@ -103,13 +108,18 @@ def sweeps_of(study: Study) -> tuple[str, ...]:
     return (*SWEEPS, *({AUTOFOCUS} & study.sweeps.keys()))
 
 
+def inputs_of(products: Collection[str]) -> tuple[str, ...]:
+    """Return the products that a study's claims are decided on, of those that it has."""
+    return (*INPUTS, *({REGISTERED} & set(products)))
+
+
 def evaluate(products: Products, study: Study) -> list[Claim]:
     """Decide every claim of Figs. 2-5 and section 1.2.
 
     Parameters
     ----------
     products
-        The products named in `INPUTS` and the sweeps that `sweeps_of` names.
+        The products that `inputs_of` names and the sweeps that `sweeps_of` names.
     study
         The configuration; the sections in `SECTIONS` are read.
 
@@ -124,6 +134,7 @@ def evaluate(products: Products, study: Study) -> list[Claim]:
         _registration_sign(shifts),
         _registration_centre(shifts),
         _registration_near_far(shifts),
+        *([registration_needed(products[REGISTERED])] if REGISTERED in products else []),
         _vertical_baseline(study),
         _critical_baseline(products, study),
         _speckle_and_shadow(products, study),
@@ -222,6 +233,46 @@ def _registration_near_far(shifts: xr.Dataset) -> Claim:
             "far_largest_y_error_m": far,
             "far_tenth_of_cell_m": far_cell,
         },
+    )
+
+
+def registration_needed(registered: xr.Dataset) -> Claim:
+    """Decide by heights whether near ground needs registration and far ground does not.
+
+    Parameters
+    ----------
+    registered
+        Product ``registered``.
+    """
+    std = registered["height_std"]
+    gained: dict[str, float] = {}
+    figures: dict[str, float] = {}
+    said = []
+    for band in ("near", "far"):
+        before, after, focused = (
+            float(std.sel(band=band, processing=name)) for name in ("plane", "circle", "refocused")
+        )
+        low, high = registered["band_edge"].sel(band=band).values
+        gained[band] = 1 - after / before
+        said.append(
+            f"from {low:g} to {high:g} m {100 * before:.2f} cm as focused on the ground plane, "
+            f"{100 * after:.2f} cm registered by the circle"
+        )
+        figures |= {
+            f"{band}_plane_std_m": before,
+            f"{band}_registered_std_m": after,
+            f"{band}_refocused_std_m": focused,
+        }
+    near, far = gained["near"] > _NEEDED, gained["far"] <= _NEEDED
+    return Claim(
+        "S13-registration",
+        "1.3",
+        "near ground needs registration of the images, far ground does not",
+        "standard deviation of the heights on visible ground: " + "; ".join(said),
+        "reproduced if registration takes more than a tenth of the standard deviation away near "
+        "and not far, contradicted if it does not near",
+        _verdict(near and far, near),
+        figures,
     )
 
 
