@@ -22,7 +22,7 @@ image is in better focus with.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -32,7 +32,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing import focusing, leakage
+from vinsar.processing import focusing, health, leakage
 from vinsar.radar import grid, trajectory, waveform
 
 if TYPE_CHECKING:
@@ -173,7 +173,8 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
     Parameters
     ----------
     echo
-        Product ``received`` of two channels, without leakage.
+        Product ``received`` of two channels, without leakage. Positions that are zero are left out
+        (`health.sound`); the errors on their two sides stand in for theirs.
     recorded
         Product ``trajectory``: the navigated positions.
     extent
@@ -186,6 +187,11 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
         a warning is logged.
     """
     channels, positions = recorded.sizes["channel"], recorded.sizes["position"]
+    used = echo["echo"].values.any(axis=(0, 2))
+    if not used.all():
+        kept = np.nonzero(used)[0]
+        found = estimate(echo.isel(position=kept), recorded.isel(position=kept), extent=extent)
+        return _spread(found, kept, positions)
     if positions < _LEAST_POSITIONS:
         return _nothing(
             channels, positions, f"{positions} positions are too few; take {_LEAST_POSITIONS}"
@@ -241,6 +247,24 @@ def _nothing(
         range_std=np.full(shape, np.nan),
         focus=focus,
         reason=reason,
+    )
+
+
+def _spread(found: Motion, kept: NDArray[np.integer], positions: int) -> Motion:
+    """Return what was found at some positions for all of them, by linear interpolation."""
+
+    def between(values: Floats) -> Floats:
+        flat = np.moveaxis(values, 1, -1).reshape(-1, kept.size)
+        lines = np.array([np.interp(np.arange(positions), kept, line) for line in flat])
+        shape = *np.moveaxis(values, 1, -1).shape[:-1], positions
+        return np.asarray(np.moveaxis(lines.reshape(shape), -1, 1))
+
+    return replace(
+        found,
+        displacement=between(found.displacement),
+        displacement_std=between(found.displacement_std),
+        range_correction=between(found.range_correction),
+        range_std=between(found.range_std),
     )
 
 
@@ -736,7 +760,9 @@ def _autofocus(products: Products, study: Study) -> xr.Dataset:
         found = Motion(nothing, nothing, still, still, (np.nan, np.nan))
     else:
         x, y = grid.image_axes(study.imaging)
-        echo = leakage.suppress(products["received"], **study.suppression.model_dump())
+        echo = leakage.suppress(
+            health.sound(products["received"]), **study.suppression.model_dump()
+        )
         found = estimate(echo, recorded, extent=(x[0], x[-1], y[0], y[-1]))
     return variables.dataset(
         "autofocus",

@@ -27,7 +27,7 @@ from vinsar.foundations import blocks, variables
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import filtering, height, interferogram, leakage
+from vinsar.processing import filtering, health, height, interferogram, leakage
 from vinsar.radar import aperture, trajectory, waveform
 
 if TYPE_CHECKING:
@@ -348,7 +348,7 @@ def _refined(products: Products, study: Study) -> xr.Dataset:
     images, unwrapped = products["images"], products["unwrapped"]
     x, y = images["x"].values, images["y"].values
     ends = [0, -1]
-    echo = leakage.suppress(products["received"], **study.suppression.model_dump())
+    echo = leakage.suppress(health.sound(products["received"]), **study.suppression.model_dump())
     echo = echo.isel(channel=ends)
     frequency = echo["frequency"].values
     channels = trajectory.apertures(images)

@@ -67,7 +67,8 @@ def suppress(echo: xr.Dataset, *, method: Method, gate_range_m: float) -> xr.Dat
 def remove_common(echo: xr.Dataset) -> xr.Dataset:
     """Remove what is common to all positions: each channel's mean spectrum over them.
 
-    A target whose range hardly changes along the aperture goes with it (`common_share`).
+    Positions that are zero, as `health.sound` leaves them, stay so and do not count. A target whose
+    range hardly changes along the aperture goes with the others (`common_share`).
 
     Parameters
     ----------
@@ -80,7 +81,12 @@ def remove_common(echo: xr.Dataset) -> xr.Dataset:
         Product ``received``.
     """
     samples = echo["echo"].values
-    return _with(echo, samples - samples.mean(axis=1, keepdims=True))
+    used = samples.any(axis=(0, 2))
+    if used.all() or not used.any():
+        return _with(echo, samples - samples.mean(axis=1, keepdims=True))
+    result = np.zeros_like(samples)
+    result[:, used] = samples[:, used] - samples[:, used].mean(axis=1, keepdims=True)
+    return _with(echo, result)
 
 
 def common_share(
