@@ -50,7 +50,7 @@ def test_a_choice_with_the_published_figures_is_found(sweeps):
     choices = likeness.compare(sweeps)
     assert len(choices) == 2 * len(likeness.SWEEPS)
     best = likeness.nearest(choices)
-    assert best.label == "rail_height_m 1.8"
+    assert best.label == "rail 1.8 m"
     assert [choice for choice in choices if choice.consistent] == [best]
     # The mean of ten has a tenth of the variance in each of three dimensions: chi with 3 degrees
     # of freedom over sqrt(10), 99.9 % of it below 4.03 / sqrt(10).
@@ -60,7 +60,7 @@ def test_a_choice_with_the_published_figures_is_found(sweeps):
 def test_distances_are_those_that_the_statistics_were_made_with(sweeps):
     # Five standard deviations in each of three independent statistics; the mean of ten errs by
     # 1 / sqrt(10), the pooled covariance of 34 x 9 degrees of freedom by a twelfth.
-    others = [c.distance for c in likeness.compare(sweeps) if c.label != "rail_height_m 1.8"]
+    others = [c.distance for c in likeness.compare(sweeps) if c.label != "rail 1.8 m"]
     expected = 5 * np.sqrt(3)
     assert np.mean(others) == pytest.approx(expected, rel=0.1)
     spread = [c.distance_std for c in likeness.compare(sweeps)]
@@ -69,7 +69,7 @@ def test_distances_are_those_that_the_statistics_were_made_with(sweeps):
 
 def test_the_conclusion_names_what_is_consistent(sweeps):
     text = likeness.conclusion(likeness.compare(sweeps))
-    assert "two standard deviations of all three published figures: rail_height_m 1.8." in text
+    assert "two standard deviations of all three published figures: rail 1.8 m." in text
     far = sweeps | {"rail_height": sweeps["noise"]}
     assert likeness.conclusion(likeness.compare(far)).startswith("No choice tried")
 
@@ -91,7 +91,7 @@ def test_the_table_has_a_row_for_each_choice_and_the_published_figures(sweeps):
     )
     text = likeness.as_markdown(sweeps | {likeness.POSITION_ERRORS: errors})
     assert "| published | 95 % | 4.5 cm | 0.88 m |" in text
-    assert text.count("| rail_height_m ") == 2
+    assert text.count("| rail ") == 2
     row = next(line for line in text.splitlines() if line.startswith("| skimage, common"))
     # Nine draws about the plateau: their mean is within 3 / sqrt(9) of a standard deviation.
     assert abs(float(row.split("|")[-2])) < 1

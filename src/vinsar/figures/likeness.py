@@ -20,7 +20,7 @@ _PANELS = (
     ("std (cm)", 100.0),
     ("worst (m)", 1.0),
 )
-_LEFT_MM, _WIDTH_MM, _GAP_MM = 56.0, 27.0, 4.0
+_LEFT_MM, _WIDTH_MM, _GAP_MM = 76.0, 22.5, 4.0
 _ROW_MM, _TOP_MM, _BOTTOM_MM = 3.4, 9.0, 15.0
 
 
@@ -79,7 +79,7 @@ def draw(products: Products, study: Study) -> Figure:
         )
         _rows(axes, at, [choice.label for choice in choices] if number == 0 else [])
         axes.set_xlabel(label)
-        axes.xaxis.set_major_locator(style.round_ticks(4))
+        axes.xaxis.set_major_locator(style.round_ticks(3))
     axes = style.place(figure, _LEFT_MM + 3 * (_WIDTH_MM + _GAP_MM), _BOTTOM_MM, _WIDTH_MM, height)
     axes.errorbar(
         [choice.distance for choice in choices],
@@ -102,6 +102,7 @@ def draw(products: Products, study: Study) -> Figure:
 
 def _rows(axes: object, at: object, labels: list[str]) -> None:
     axes.set_yticks(at, labels or [""] * len(at))  # type: ignore[attr-defined,arg-type]
+    axes.tick_params(axis="y", labelsize="small")  # type: ignore[attr-defined]
     axes.set_ylim(at[-1] - 0.7, 0.7)  # type: ignore[attr-defined,index]
     axes.grid(axis="y", linewidth=0.3)  # type: ignore[attr-defined]
 

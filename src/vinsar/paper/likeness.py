@@ -29,7 +29,7 @@ SWEEPS = (
     *("rail_height", "frequency_count", "facet_size", "facet_jitter", "reflectivity", "noise"),
     *("range_window", "aperture_window", "grid_spacing"),
     *("goldstein_alpha", "goldstein_patch", "filter", "unwrapping", "reference"),
-    *("rail_and_unwrapping", "patch_and_unwrapping", "rail_and_patch"),
+    *("patch_and_unwrapping", "rail_and_patch", "rail_and_noise", "rail_and_windows"),
 )
 """Sweeps over choices that the paper leaves open."""
 
@@ -44,6 +44,23 @@ PUBLISHED = (0.95, PAPER_STD_M, 0.88)
 
 PLATEAU_M = 0.043
 """Height std near which Fig. 5 fluctuates from two wavelengths on, m (section 2.4)."""
+
+_LABELS = {
+    "radar.rail_height_m": "rail {} m",
+    "radar.frequency_count": "{} frequencies",
+    "scene.facet_size_m": "facets {} m",
+    "scene.facet_jitter": "jitter {}",
+    "echo.reflectivity": "reflectivity as {}",
+    "echo.snr_db": "SNR {} dB",
+    "imaging.range_window": "range {}",
+    "imaging.aperture_window": "aperture {}",
+    "imaging.grid_spacing_m": "pixels {} m",
+    "filtering.method": "filter {}",
+    "filtering.goldstein_alpha": "alpha {}",
+    "filtering.goldstein_patch_px": "patch {}",
+    "unwrapping.method": "{}",
+    "height.reference": "reference {}",
+}
 
 _LEAST_SHARE = 1e-4
 _BOUND = 2.0
@@ -167,15 +184,19 @@ def _cases(name: str, sweep: xr.Dataset) -> list[tuple[str, Floats]]:
     found = []
     for index in np.ndindex(*(sweep.sizes[key] for key in keys)):
         parts = [
-            f"{sweep[key].attrs['long_name'].rpartition('.')[2]} {_value(sweep[key].values[at])}"
+            _label(sweep[key].attrs["long_name"], sweep[key].values[at])
             for key, at in zip(keys, index, strict=True)
         ]
         found.append((", ".join(parts), table[index]))
     return found
 
 
-def _value(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float | np.floating) else str(value)
+def _label(key: str, value: object) -> str:
+    """Return a choice in a few words: its key, and its value."""
+    text = f"{value:g}" if isinstance(value, float | np.floating) else str(value)
+    return _LABELS.get(key, f"{key} {{}}").format(
+        text.replace("_", " ").replace("rectangular", "rect")
+    )
 
 
 def nearest(choices: list[Choice]) -> Choice:
