@@ -61,6 +61,7 @@ def assess(
     filtering: Mapping[str, Any],
     frequency: Floats,
     windows: tuple[waveform.WindowName, waveform.WindowName],
+    removed: Floats | None = None,
 ) -> tuple[Floats, NDArray[np.int8]]:
     """Return the standard deviation and the class of the heights of a DEM.
 
@@ -84,6 +85,10 @@ def assess(
         Frequencies, Hz.
     windows
         Weightings of the frequencies and of the aperture.
+    removed
+        Phase without that of the ground plane (y, x) that a second pass took away before the
+        filter, with the band that the channels do not share, rad. Filter and noise are those of
+        what is left; None for images on the ground plane.
 
     Returns
     -------
@@ -106,13 +111,20 @@ def assess(
     )
     absolute = np.where(np.isfinite(phase), phase, flat)
     bandwidth = float(frequency[-1] - frequency[0]) / waveform.carrier(frequency)
-    filter_ = response_to(product, **filtering)
+    known = np.zeros(product.shape) if removed is None else removed
+    turn = np.exp(1j * known).astype(np.complex64)
+    left, told = product / turn, absolute if removed is None else absolute - flat - known
+    filter_ = response_to(left, **filtering)
     noise = uncertainty.estimate(
-        pictures, absolute, flat,
-        resolution=resolution, spacing=spacing, relative_bandwidth=bandwidth,
-    )  # fmt: skip
-    by_noise = uncertainty.noise_variance(noise, filter_, product, smooth, spacing=spacing)
-    taken = uncertainty.smoothing(filter_, product, resolution=resolution, spacing=spacing)
+        np.stack([pictures[0], pictures[1] * turn]),
+        told,
+        flat if removed is None else np.zeros(product.shape),
+        resolution=resolution,
+        spacing=spacing,
+        relative_bandwidth=bandwidth,
+    )
+    by_noise = uncertainty.noise_variance(noise, filter_, left, smooth / turn, spacing=spacing)
+    taken = uncertainty.smoothing(filter_, left, resolution=resolution, spacing=spacing)
     wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
     own = np.minimum(by_noise + uncertainty.mean(taken**2, wide), uncertainty.UNIFORM)
     shared = _reference_variance(reference, noise, product, own, x, y)

@@ -87,6 +87,13 @@ variables.declare(
         "surface": Variable(
             GRID, "real", "m", "height of the surface that the image's pixel is focused on"
         ),
+        "surface_phase": Variable(
+            GRID,
+            "real",
+            "radian",
+            "phase of the surface, removed before the filter",
+            "without the flat-earth phase",
+        ),
         "shared": Variable(
             GRID, "real", "1", "share of band times aperture that both channels have in common"
         ),
@@ -396,6 +403,7 @@ def _refined(products: Products, study: Study) -> xr.Dataset:
                 lower, upper, study.interferogram.coherence_window_px
             ),
             "surface": found,
+            "surface_phase": known,
             "shared": common.share(frequency, positions),
         },
         {"x": x, "y": y},

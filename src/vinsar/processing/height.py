@@ -396,9 +396,10 @@ def _dem(products: Products, study: Study) -> xr.Dataset:
         refined = unwrapped = products["refined"]
         images = images.isel(channel=[0, -1]).assign(image=refined["image"])
         formed, smooth = refined, refined[["filtered"]].rename(filtered="interferogram")
+        removed = refined["surface_phase"].values
     else:
         images = images.isel(channel=[0, -1])
-        formed, smooth = products["interferogram"], products["filtered"]
+        formed, smooth, removed = products["interferogram"], products["filtered"], None
     points = reference(x, y, options)
     offset = phase_offset(unwrapped, images, points, trend=options.trend)
     found = invert(unwrapped, images, offset)
@@ -414,6 +415,7 @@ def _dem(products: Products, study: Study) -> xr.Dataset:
         filtering=study.filtering.model_dump(),
         frequency=waveform.sampled(study.radar),
         windows=(study.imaging.range_window, study.imaging.aperture_window),
+        removed=removed,
     )
     return variables.dataset(
         "dem",
