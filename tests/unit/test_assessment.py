@@ -52,7 +52,7 @@ def std_with(rail):
             height=np.zeros(shape),
             true_y=np.broadcast_to(Y[:, None], shape),
             code=lambda values: values,
-            reference=assessment.Reference((corner,), plane=False, level=True),
+            reference=assessment.Reference((corner,), (0.0,), plane=False, level=True),
             filtering={"method": method, **OPTIONS},
             frequency=FREQUENCY,
             windows=("rectangular", "rectangular"),

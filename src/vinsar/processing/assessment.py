@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from vinsar.radar import aperture, waveform
 from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -21,11 +22,18 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
 
+logger = logging.getLogger(__name__)
+
 # Samples of a weighting, enough for its noise bandwidth.
 _WEIGHTS = 401
 
 # Antennas closer than this stand in one place.
 _SAME_M = 1e-6
+
+
+# Share of reference ground that is to be valid, as its fit is a median, and how many standard
+# deviations it may be off.
+_LEAST_VALID, _MOST_AWAY = 0.5, 3.0
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,8 @@ class Reference:
     ----------
     rectangles
         Rows and columns of the pixels of each piece of it: of level ground, or of single points.
+    heights
+        What they are declared to be, m.
     plane
         Whether a plane was fitted, not a constant.
     level
@@ -44,6 +54,7 @@ class Reference:
     """
 
     rectangles: tuple[tuple[slice, slice], ...]
+    heights: tuple[float, ...]
     plane: bool
     level: bool
 
@@ -64,6 +75,8 @@ def assess(
     removed: Floats | None = None,
 ) -> tuple[Floats, NDArray[np.int8]]:
     """Return the standard deviation and the class of the heights of a DEM.
+
+    What speaks against the height reference is logged as a warning (`doubts`).
 
     Parameters
     ----------
@@ -135,9 +148,8 @@ def assess(
     share = np.where(np.isfinite(true_y), (true_y - ahead) / spacing[1], 0.0) % 1
     alike = filter_.neighbours(noise.decorrelation, spacing)
     kept = 1 - 2 * share * (1 - share) * (1 - alike)
-    std = np.sqrt(code((kept * own + shared) * per_phase**2)) * _at_one_place(
-        drift, height, resolution, spacing
-    )
+    moved = _at_one_place(drift, height, resolution, spacing)
+    std = np.sqrt(code((kept * own + shared) * per_phase**2)) * moved
     cycles = classification.split_band(
         pictures, absolute - flat, antennas,
         x=x, y=y, wavelength_m=instrument.wavelength, resolution=resolution,
@@ -167,7 +179,70 @@ def assess(
         y=y,
         window_px=uncertainty.window(classification.SPLIT_LOOKS[0], resolution, spacing),
     )
+    alone = np.sqrt(code(kept * own * per_phase**2)) * moved
+    for doubt in doubts(reference, height, alone, kind, x=x, y=y):
+        logger.warning("%s", doubt)
     return std, kind
+
+
+def doubts(
+    reference: Reference,
+    height: Floats,
+    std: Floats,
+    kind: NDArray[np.int8],
+    *,
+    x: Floats,
+    y: Floats,
+) -> Iterator[str]:
+    """Yield what speaks against the height reference: it is not seen, or not as high as declared.
+
+    Parameters
+    ----------
+    reference
+        What the phase's constant was taken from.
+    height
+        Heights (y, x), m; NaN where there is none.
+    std
+        Their standard deviation without the part that all heights share (y, x), m.
+    kind
+        Their classes (y, x).
+    x, y
+        Axes, m.
+    """
+    for where, declared in zip(reference.rectangles, reference.heights, strict=True):
+        left, right = x[where[1]][[0, -1]]
+        near, far = y[where[0]][[0, -1]]
+        place = (
+            f"level ground at x = {left:.2f} to {right:.2f} m, y = {near:.2f} to {far:.2f} m"
+            if reference.level
+            else f"control point at x = {left:.2f} m, y = {near:.2f} m"
+        )
+        classes = kind[where]
+        shares = {
+            label.replace("_", " "): float((classes == number).mean())
+            for number, label in enumerate(classification.CLASSES)
+        }
+        if shares.pop("valid") < _LEAST_VALID:
+            told = ", ".join(
+                f"{100 * share:.0f} % {label}" for label, share in shares.items() if share
+            )
+            yield (
+                f"the {place} is to a large part not known ({told}), and all heights hang on it: "
+                "declare ground that the radar sees"
+            )
+        known = np.isfinite(height[where]) & (std[where] > 0)
+        if not known.any():
+            continue
+        away = (height[where] - declared)[known]
+        error = float(np.sqrt(np.mean(std[where][known] ** 2)))
+        rms = float(np.sqrt(np.mean(away**2)))
+        if rms > _MOST_AWAY * error:
+            yield (
+                f"the {place} comes out {100 * rms:.1f} cm (rms) off its declared "
+                f"{declared:g} m, {rms / error:.1f} times its standard deviation of "
+                f"{100 * error:.1f} cm, and {100 * away.mean():+.1f} cm on average: it is not "
+                "level, not so high, or seen wrongly, and all heights hang on it"
+            )
 
 
 def _spacing(x: Floats, y: Floats) -> tuple[float, float]:

@@ -102,7 +102,8 @@ def sound(echo: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If half of a channel's positions or more are left out, or two channels hold the same echo.
+        If fewer than half of the positions are sound in all channels, or two channels hold the
+        same echo.
     """
     samples = echo["echo"].values
     names = [str(name) for name in echo["channel"].values]

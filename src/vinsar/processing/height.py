@@ -435,17 +435,23 @@ def _reference(options: Height, x: Floats, y: Floats) -> assessment.Reference:
     """Return the pixels of the height reference."""
     level = options.reference == "level_ground"
     if level:
-        extents = [(r.y_min_m, r.y_max_m, r.x_min_m, r.x_max_m) for r in options.level_ground]
+        height_m = options.level_ground_height_m
+        extents = [
+            (r.y_min_m, r.y_max_m, r.x_min_m, r.x_max_m, height_m) for r in options.level_ground
+        ]
     else:
-        extents = [(p.y_m, p.y_m, p.x_m, p.x_m) for p in options.control_points]
-    rectangles = []
-    for near, far, left, right in extents:
+        extents = [(p.y_m, p.y_m, p.x_m, p.x_m, p.height_m) for p in options.control_points]
+    rectangles, heights = [], []
+    for near, far, left, right, declared in extents:
         rows, columns = (
             _indices(axis, *ends) for axis, ends in ((y, (near, far)), (x, (left, right)))
         )
         if rows is not None and columns is not None:
             rectangles.append((rows, columns))
-    return assessment.Reference(tuple(rectangles), plane=options.trend == "plane", level=level)
+            heights.append(declared)
+    return assessment.Reference(
+        tuple(rectangles), tuple(heights), plane=options.trend == "plane", level=level
+    )
 
 
 def _indices(axis: Floats, first: float, last: float) -> slice | None:
