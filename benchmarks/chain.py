@@ -14,7 +14,13 @@ from vinsar.foundations.configuration import Study
 from vinsar.study import pipeline
 
 ROOT = Path(__file__).parents[1]
-FRAME = ("profiles", "images", "interferogram", "filtered", "unwrapped", "dem")
+# What the echo does not change.
+BEFORE = ("trajectory", "recorded_trajectory", "received")
+CHAINS = {
+    "echo to DEM with class and standard deviation": {},
+    "with a second pass on the surface": {"imaging": {"surface": "estimated"}},
+    "with autofocus": {"autofocus": {"method": "echoes"}},
+}
 
 
 def study(*, coarse):
@@ -22,26 +28,38 @@ def study(*, coarse):
     paper = vinsar.load()
     if not coarse:
         return paper
-    override = paper.variants["grid of 5 cm"]
+    return changed(paper, paper.variants["grid of 5 cm"])
+
+
+def changed(one, changes):
+    """Return a study with some keys of its sections changed."""
     sections = {
-        name: getattr(paper, name).model_copy(update=values) for name, values in override.items()
+        name: getattr(one, name).model_copy(update=values) for name, values in changes.items()
     }
-    return paper.model_copy(update=sections)
+    return one.model_copy(update=sections)
 
 
 def frames(count=60, workers=2):
-    """Measure frames a second from echo in memory to coded DEM, several frames at once.
+    """Measure frames a second from echo in memory to DEM, several frames at once."""
+    return [row for name in CHAINS for row in frames_of(name, count, workers)]
+
+
+def frames_of(chain, count, workers):
+    """Measure frames a second of one of `CHAINS`.
 
     Each frame is computed by one thread; Dask's threads compute frames side by side.
     """
-    chosen: Study = study(coarse=True)
+    chosen: Study = changed(study(coarse=True), CHAINS[chain])
     products = pipeline.run(chosen, only="dem")
     expected = products["dem"]["height"].values
+    stages = pipeline.stages(chosen)
+    given = pipeline.needed(BEFORE, stages)
+    again = [name for name in pipeline.needed(("dem",), stages) if name not in given]
 
     def frame(_):
         with blocks.serially():
-            made = dict(products)
-            for name in FRAME:
+            made = {name: products[name] for name in given}
+            for name in again:
                 made[name] = pipeline.run_stage(name, made, chosen)
         return made["dem"]["height"].values
 
@@ -57,9 +75,15 @@ def frames(count=60, workers=2):
         spent = (time.process_time() - spent) / (3 * count)
         same = all(np.array_equal(height, expected, equal_nan=True) for height in heights)
         result.append(
-            {"workers": threads, "frames_per_s": float(np.median(rates)), "all": rates,
-             "core_seconds": spent, "same_bits": same}
-        )  # fmt: skip
+            {
+                "chain": chain,
+                "workers": threads,
+                "frames_per_s": float(np.median(rates)),
+                "all": rates,
+                "core_seconds": spent,
+                "same_bits": same,
+            }
+        )
     return result
 
 
