@@ -53,24 +53,25 @@ def draw(products: Products, study: Study) -> Figure:
     planned = [instrument.Instrument.planned(radar.with_baseline(float(value))) for value in length]
     ambiguity = np.array([float(part.height_of_ambiguity(*place)) for part in planned])
     theory = np.array([float(part.geometric_coherence(*place)) for part in planned])
-    height = 88.0
+    height = 92.0
     figure = style.new_figure(style.TWO_COLUMNS_MM, height)
-    left, bottom, width, tall = 13.0, 24.0, 88.0, 58.0
+    left, bottom, width, tall = 13.0, 28.0, 88.0, 58.0
     limits = sweeps.around(length, [quarter], low=0.85, high=1.18)
 
     axes = style.place(figure, left, bottom, width, tall)
     found, _, _ = sweeps.spread(sweep["coherence"])
-    expected = {
-        f"predicted, {source}": (
-            ambiguity
-            / (2 * np.pi)
-            * [
-                float(sweeps.phase_std(study, name, part, value))
-                for part, value in zip(planned, coherence, strict=True)
-            ]
-        )
-        for source, coherence in (("level ground", theory), ("measured coherence", found))
+    sources = {"level ground": theory, "measured coherence": found}
+    # Standard deviation and bound (case, 2) by the coherence that they follow from.
+    heights = {
+        source: (ambiguity / (2 * np.pi))[:, None]
+        * [
+            np.ravel(sweeps.phase_std(study, name, part, value))
+            for part, value in zip(planned, coherence, strict=True)
+        ]
+        for source, coherence in sources.items()
     }
+    expected = {f"predicted, {source}": values[:, 0] for source, values in heights.items()}
+    bound = heights["level ground"][:, 1]
     spreads = _spreads(axes, sweep, length)
     curves, _ = axes.get_legend_handles_labels()
     styles: list[Any] = ["--", ":"]
@@ -78,15 +79,18 @@ def draw(products: Products, study: Study) -> Figure:
         axes.plot(length, 100 * values, color=style.GREY, linestyle=line, label=label)[0]
         for (label, values), line in zip(expected.items(), styles, strict=True)
     ]
+    lines.append(sweeps.draw_bound(axes, length, 100 * bound))
     sweeps.log_x(axes, limits)
-    sweeps.log_y(axes, sweeps.around(spreads, *(100 * values for values in expected.values())))
+    sweeps.log_y(
+        axes, sweeps.around(spreads, 100 * bound, *(100 * values for values in expected.values()))
+    )
     best = _best(axes, sweep, length)
     axes.set_xlabel("baseline B (m)")
     axes.set_ylabel("height error (cm)")
     axes.set_title("(a) spread of the height error")
     mark = _mark(axes, quarter)
 
-    tops, small = (56.0, 24.0), 26.0
+    tops, small = (60.0, 28.0), 26.0
     right, narrow = 121.0, 56.0
     upper = style.place(figure, right, tops[0], narrow, small)
     upper.plot(length, ambiguity, color=style.INK)

@@ -104,6 +104,8 @@ def _noise(axes: Axes, sheet: design.Sheet, y: Floats) -> None:
     label = "without noise" if own is None else f"as configured, {own:g} dB"
     curves = [100 * sheet.height_std(y)]
     axes.plot(y, curves[0], color=style.INK, label=label)
+    curves.append(100 * sheet.height_bound(y))
+    sweeps.draw_bound(axes, y, curves[-1])
     for level, line in _SNR_DB:
         if level != own:
             parts = {name: getattr(study, name) for name in design.SECTIONS}

@@ -49,9 +49,11 @@ def draw(products: Products, study: Study) -> Figure:
     filled = planned.filled(scene.x_min_m, scene.x_max_m, place[1])
     coherence = speckle.pixel_coherence(planned.geometric_coherence(*place), ratio, filled)
     per_radian = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi)
-    predicted = per_radian * sweeps.phase_std(study, "snr", planned, coherence)
-    figure = style.new_figure(style.ONE_COLUMN_MM, 91.0)
-    axes = style.place(figure, 13.0, 33.0, 72.0, 52.0)
+    predicted, bound = (
+        per_radian * std for std in sweeps.phase_std(study, "snr", planned, coherence)
+    )
+    figure = style.new_figure(style.ONE_COLUMN_MM, 95.0)
+    axes = style.place(figure, 13.0, 37.0, 72.0, 52.0)
     values = []
     for name, region, scale, look in _PARTS:
         data = 100 * scale * sweep[name].sel(region=region)
@@ -66,6 +68,7 @@ def draw(products: Products, study: Study) -> Figure:
         linestyle="--",
         label="predicted, level ground",
     )
+    handles.append(sweeps.draw_bound(axes, ratio, bound))
     random = 100 * float(planned.random_phase_std(*place))
     handles.append(
         axes.axhline(
@@ -76,7 +79,7 @@ def draw(products: Products, study: Study) -> Figure:
             label=f"random phase: {random:.1f} cm",
         )
     )
-    limits = sweeps.around(*values, predicted, [random])
+    limits = sweeps.around(*values, predicted, bound, [random])
     sweeps.log_y(axes, limits)
     axes.xaxis.set_major_locator(style.round_ticks(7))
     axes.set_xlabel("signal-to-noise ratio of a range cell (dB)")
@@ -109,7 +112,8 @@ FIGURES = {
         title="Thermal noise",
         caption=(
             "Height error against the signal-to-noise ratio of a range cell, with the noise that "
-            "the looks of the phase filter leave of level ground."
+            "the looks of the phase filter leave of level ground, and the Cramér-Rao bound of as "
+            "many looks."
         ),
         sections=("figures", "radar", "scene", "imaging", "filtering", "sweeps"),
         sweeps=("snr",),

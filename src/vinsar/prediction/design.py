@@ -340,6 +340,20 @@ class Sheet:
         """
         return self._height_std(self.x, y, self.coherence(y, position_errors))
 
+    def height_bound(self, y: ArrayLike) -> Floats:
+        """Return the Cramer-Rao bound of the height's standard deviation, m.
+
+        Of the phase filter's looks at the predicted coherence (`speckle.phase_bound`).
+
+        Parameters
+        ----------
+        y
+            Distance ahead, m.
+        """
+        coherence = self.coherence(y)
+        per_radian = self.instrument.height_of_ambiguity(self.x, y) / (2 * np.pi)
+        return np.asarray(per_radian * speckle.phase_bound(coherence, self.looks(y, coherence)))
+
     def _height_std(self, x: ArrayLike, y: ArrayLike, coherence: Floats) -> Floats:
         per_radian = self.instrument.height_of_ambiguity(x, y) / (2 * np.pi)
         return np.asarray(per_radian * speckle.phase_std(coherence, self.looks(y, coherence)))

@@ -34,6 +34,9 @@ def test_baseline_length_shows_the_sweep_the_prediction_and_the_optimum(
     looks = filtering.effective_looks(gamma, cells, shifted=1.0, **filters)
     height = wavelength * r2 / (2 * np.array(length))
     expected = height / (2 * np.pi) * phase_std(gamma, looks)
+    # Rodriguez and Martin (1992), written out.
+    bound = height / (2 * np.pi) * np.sqrt((1 - gamma**2) / (2 * looks)) / gamma
+    np.testing.assert_allclose(lines["Cramér-Rao bound"].get_ydata(), 100 * bound)
     critical = np.sqrt((15 / 13 * r1) ** 2 - 11**2) - 2
     np.testing.assert_allclose(lines["predicted, level ground"].get_ydata(), 100 * expected)
     np.testing.assert_allclose(ambiguity.lines[0].get_ydata(), height)

@@ -21,9 +21,12 @@ def test_snr_shows_the_sweep_and_the_prediction(draw, lines_of, products, study)
     planned, place = Instrument.planned(study.radar), (0.0, 11.0)
     filled = planned.filled(study.scene.x_min_m, study.scene.x_max_m, 11.0)
     gamma = planned.geometric_coherence(*place) / (1 + filled * 10 ** (-ratio / 10))
-    phase = sweeps.phase_std(study, "snr", planned, gamma)
-    expected = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi) * phase
-    np.testing.assert_allclose(lines["predicted, level ground"].get_ydata(), expected)
+    phase, bound = sweeps.phase_std(study, "snr", planned, gamma)
+    per_radian = 100 * planned.height_of_ambiguity(*place) / (2 * np.pi)
+    np.testing.assert_allclose(lines["predicted, level ground"].get_ydata(), per_radian * phase)
+    np.testing.assert_allclose(lines["Cramér-Rao bound"].get_ydata(), per_radian * bound)
+    # No unbiased estimate of a phase that does not wrap is below it; noise alone wraps.
+    assert (bound <= phase)[gamma > 0.5].all()
 
 
 def test_it_is_as_wide_as_a_column(usual):

@@ -162,7 +162,7 @@ def around(*values: Any, low: float = 0.75, high: float = 1.35) -> tuple[float, 
 
 def phase_std(
     study: Study, sweep: str, planned: instrument.Instrument, coherence: Floats
-) -> Floats:
+) -> tuple[Floats, Floats]:
     """Return the predicted standard deviation of the filtered phase in a sweep's cases, rad.
 
     Parameters
@@ -178,8 +178,8 @@ def phase_std(
 
     Returns
     -------
-    ndarray
-        Standard deviation, of level ground.
+    tuple of ndarray
+        Standard deviation, of level ground, and the Cramer-Rao bound of as many looks.
     """
     scene, imaging, options = (
         swept_section(study, sweep, name) for name in ("scene", "imaging", "filtering")
@@ -187,4 +187,12 @@ def phase_std(
     looks = design.filter_looks(
         planned, *instrument.middle(scene), coherence, options=options, imaging=imaging
     )
-    return speckle.phase_std(coherence, looks)
+    return speckle.phase_std(coherence, looks), speckle.phase_bound(coherence, looks)
+
+
+def draw_bound(axes: Axes, at: Floats, bound: Floats) -> Any:
+    """Draw the Cramer-Rao bound of the height, cm, and return its line."""
+    (line,) = axes.plot(
+        at, bound, color=style.INK, linestyle=(0, (1, 1)), linewidth=0.9, label="Cramér-Rao bound"
+    )
+    return line
