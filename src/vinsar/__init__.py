@@ -95,8 +95,10 @@ def run(
     for name in products:
         if name not in there and name not in known:
             raise ValueError(f"the study has no product '{name}'; it has {', '.join(there)}")
-    for wanted in [name for name in products if name not in known] if products else [None]:
-        known = pipeline.run(study, wanted, known)
+    for wanted in products or (None,):
+        # The one before may have needed it.
+        if wanted not in known:
+            known = pipeline.run(study, wanted, known)
     return known
 
 

@@ -62,6 +62,11 @@ def test_a_run_goes_on_from_what_is_given(study, products):
     assert "focus" in more
 
 
+def test_a_product_may_be_asked_for_after_one_that_needs_it(study):
+    found = vinsar.run(study, "facets", "terrain")
+    assert list(found) == list(vinsar.run(study, "facets"))
+
+
 def test_an_unknown_product_is_named(study):
     with pytest.raises(ValueError, match="no product 'demm'"):
         vinsar.run(study, "demm")
