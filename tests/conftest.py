@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -14,6 +16,22 @@ from vinsar.study import composition  # noqa: F401, which declares all products
 
 settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=60)
 settings.load_profile("reproducible")
+
+
+def pytest_configure(config):
+    """Let what a test starts hear Ctrl-C: workers of pytest ignore it, which is inherited."""
+    if hasattr(config, "workerinput"):
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Give each file to one worker, which makes its fixtures once; the slow folders first."""
+    if hasattr(config, "workerinput"):
+        slow = ("cluster", "workflow")
+        items.sort(key=lambda item: not any(name in item.path.parts for name in slow))
+        for item in items:
+            item.add_marker(pytest.mark.xdist_group(item.path.as_posix()))
 
 
 @pytest.fixture(scope="session")
