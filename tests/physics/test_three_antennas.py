@@ -58,3 +58,23 @@ def test_boxes_beyond_half_the_ambiguity_keep_their_height_by_three_antennas_onl
 
 def test_the_ground_beside_boxes_keeps_its_cycle(found):
     assert all(part["ground_wrong"][1] < 0.001 for part in found)
+
+
+def test_a_long_baseline_whose_cycles_are_settled_makes_better_heights():
+    """The paper's relief is four heights of ambiguity of 1 m high, and unwraps wrongly alone."""
+
+    def visible(*baselines):
+        study = vinsar.load(
+            seed=1,
+            radar={"baseline_m": baselines[-1], "baselines_m": list(baselines)},
+            echo={"accuracy_db": -60.0},
+            imaging={"grid_spacing_m": 0.05, "surface": "estimated"},
+            filtering={"method": "gaussian", "gaussian_std_px": 2.0},
+        )
+        found = vinsar.run(study, "accuracy")["accuracy"]
+        return float(found["std"].sel(region="visible_ground"))
+
+    settled = visible(0.15, 1.0)
+    # A tenth at least, where phase noise alone would make it a third of that of 0.3 m.
+    assert settled < 0.9 * visible(0.15, 0.3)
+    assert settled < 0.5 * visible(1.0)
