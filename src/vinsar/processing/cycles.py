@@ -5,9 +5,9 @@ exceeds: it needs no unwrapping. Its heights tell the phase that a longer baseli
 within a fraction of a cycle, so upright objects, on which no path of small phase steps leads, come
 out at their own height. From the shortest baseline to the longest, each tells the next.
 
-The cycle is the median's over a window, rounded. Maximum likelihood over all baselines weighs each
-phase by its coherence; with one short and one long baseline that is the same decision, as the long
-one's phase is the finer by far, and the median does not mix an object's top with the ground.
+The cycle is the median's over a window, rounded. Maximum likelihood over all baselines is the same
+decision pixel by pixel, as the long one's phase is the finer by far; added up over a window it
+mixes an object's top with the ground more than the median does (docs/antennas.md).
 """
 
 from __future__ import annotations
