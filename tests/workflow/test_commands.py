@@ -70,7 +70,8 @@ def test_a_command_of_the_pages_is_taken(start, place, monkeypatch, command):
     monkeypatch.setattr(start, "follow_workflows", list)
     start.main(arguments)
     (options,) = taken
-    rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
+    files = [ROOT / "Snakefile", *(ROOT / "workflow/rules").glob("*.smk")]
+    rules = "".join(path.read_text() for path in files)
     for target in options.targets:
         assert target.startswith("results/") or f"rule {target}:" in rules, target
     assert all(path.is_file() for path in options.configfile)
