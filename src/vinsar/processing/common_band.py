@@ -301,31 +301,37 @@ def focus(
     windowed = waveform.window(range_window, frequency.size) / attenuation
     step = float(frequency[-1] - frequency[0]) / (frequency.size - 1)
     kinds = common.bands.shape[1]
-    profile = np.empty((2, kinds, samples.shape[1], transform.shape[-1]), np.float32)
+    profile = np.empty((2, 2, kinds, samples.shape[1], transform.shape[-1]), np.float32)
     image = np.empty((2, *point.shape[1:]), np.complex64)
-    for channel in range(2):
-        low = np.maximum(frequency - step / 2, common.bands[channel, :, :1])
-        high = np.minimum(frequency + step / 2, common.bands[channel, :, 1:])
-        kept = (windowed * np.clip((high - low) / step, 0, 1)).astype(np.float32)
-        data = (samples[channel] * weights[:, None]).astype(np.complex64)
-        antennas = np.ascontiguousarray(ends[channel].transpose(0, 2, 1))
-        if np.array_equal(antennas[0], antennas[1]):
-            antennas = antennas[:1]
+    low = np.maximum(frequency - step / 2, common.bands[..., :1])
+    high = np.minimum(frequency + step / 2, common.bands[..., 1:])
+    kept = (windowed * np.clip((high - low) / step, 0, 1)).astype(np.float32)
+    data = (samples * weights[:, None]).astype(np.complex64)
+    antennas = np.ascontiguousarray(ends.transpose(0, 1, 3, 2))
+    if np.array_equal(antennas[:, 0], antennas[:, 1]):
+        antennas = antennas[:, :1]
 
-        def compress(begin: int, data: Complexes = data, kept: Floats = kept) -> None:
-            part = slice(begin, begin + _POSITIONS_PER_BLOCK)
-            subbands.compress(data[part], kept, transform, profile[:, :, part])
+    def compress(channel: int, begin: int) -> None:
+        part = slice(begin, begin + _POSITIONS_PER_BLOCK)
+        subbands.compress(
+            data[channel, part], kept[channel], transform, profile[channel, :, :, part]
+        )
 
-        def accumulate(begin: int, channel: int = channel, antennas: Floats = antennas) -> None:
-            rows = slice(begin, begin + _ROWS_PER_BLOCK)
-            subbands.accumulate(
-                image[channel, rows], np.ascontiguousarray(point[:, rows]), common.kind[rows],
-                common.first[channel, rows], common.last[channel, rows], antennas, profile,
-                first_range, spacing, 2 * waveform.carrier(frequency) / SPEED_OF_LIGHT,
-            )  # fmt: skip
+    def accumulate(channel: int, begin: int) -> None:
+        rows = slice(begin, begin + _ROWS_PER_BLOCK)
+        subbands.accumulate(
+            image[channel, rows], np.ascontiguousarray(point[:, rows]), common.kind[rows],
+            common.first[channel, rows], common.last[channel, rows], antennas[channel],
+            profile[channel], first_range, spacing,
+            2 * waveform.carrier(frequency) / SPEED_OF_LIGHT,
+        )  # fmt: skip
 
-        blocks.run(compress, ((n,) for n in range(0, len(data), _POSITIONS_PER_BLOCK)))
-        blocks.run(accumulate, ((n,) for n in range(0, point.shape[1], _ROWS_PER_BLOCK)))
+    # Both channels at once: each start of Dask takes as long as some blocks.
+    for work, size, each in (
+        (compress, data.shape[1], _POSITIONS_PER_BLOCK),
+        (accumulate, point.shape[1], _ROWS_PER_BLOCK),
+    ):
+        blocks.run(work, [(channel, n) for channel in range(2) for n in range(0, size, each)])
     return image
 
 
