@@ -24,14 +24,11 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Give each file to one worker, which makes its fixtures once; the slow folders first."""
+    """Begin with the slow folders, so that workers end together."""
     if hasattr(config, "workerinput"):
         slow = ("cluster", "workflow")
         items.sort(key=lambda item: not any(name in item.path.parts for name in slow))
-        for item in items:
-            item.add_marker(pytest.mark.xdist_group(item.path.as_posix()))
 
 
 @pytest.fixture(scope="session")
