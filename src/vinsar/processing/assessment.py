@@ -72,6 +72,7 @@ def assess(
     filtering: Mapping[str, Any],
     frequency: Floats,
     windows: tuple[waveform.WindowName, waveform.WindowName],
+    motion: xr.Dataset,
     removed: Floats | None = None,
 ) -> tuple[Floats, NDArray[np.int8]]:
     """Return the standard deviation and the class of the heights of a DEM.
@@ -98,6 +99,8 @@ def assess(
         Frequencies, Hz.
     windows
         Weightings of the frequencies and of the aperture.
+    motion
+        Product ``autofocus`` of the two channels: what is left of the positions' errors.
     removed
         Phase without that of the ground plane (y, x) that a second pass took away before the
         filter, with the band that the channels do not share, rad. Filter and noise are those of
@@ -141,6 +144,7 @@ def assess(
     wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
     own = np.minimum(by_noise + uncertainty.mean(taken**2, wide), uncertainty.UNIFORM)
     shared = _reference_variance(reference, noise, product, own, x, y)
+    shared = shared + motion_variance(motion, instrument, reference, x, y)
     ambiguity = instrument.height_of_ambiguity(across, ahead)
     per_phase = ambiguity / (2 * np.pi)
     drift = _drift(instrument, x, y)
@@ -308,6 +312,31 @@ def _reference_variance(
     covariance = (inverse * found) @ inverse.T
     places = np.stack(np.broadcast_arrays(1.0, x[None, :] - x[0], y[:, None] - y[0]), axis=-1)
     return np.asarray(np.einsum("yxi,ij,yxj->yx", places, covariance, places))
+
+
+def motion_variance(
+    motion: xr.Dataset, instrument: Instrument, reference: Reference, x: Floats, y: Floats
+) -> Floats | float:
+    """Return the variance of the phase by what autofocus leaves (y, x), rad^2.
+
+    The image's steps measure how positions depart from their mean. A constant difference between
+    the channels, which is one of the baseline, they cannot tell from topography: it stays as it is
+    recorded. Errors independent from position to position leave in it their own variance over the
+    number of positions, and the height reference takes what of it is common to all pixels.
+    """
+    found, std = (motion[name].values for name in ("displacement", "displacement_std"))
+    if not np.isfinite(std).all():
+        return uncertainty.UNIFORM
+    square = ((found[0] - found[1]) ** 2 + (std**2).sum(axis=0)).mean(axis=0)
+    if not square.any():
+        return 0.0
+    # The path grows with a target's displacement as it falls with the antennas'.
+    path = aperture.gradients(instrument.lower, x[None, :], y[:, None])[0]
+    pieces = [path[:, rows, columns].mean(axis=(1, 2)) for rows, columns in reference.rectangles]
+    if pieces:
+        path = path - np.mean(pieces, axis=0)[:, None, None]
+    wave = 2 * np.pi / instrument.wavelength
+    return np.asarray(wave**2 * np.einsum("iyx,i->yx", path**2, square) / found.shape[1])
 
 
 def _pieces(where: tuple[slice, slice], reference: Reference) -> list[tuple[slice, slice]]:

@@ -709,6 +709,9 @@ class _Image:
         # Along x a constant and a stretch turn and scale the image, which no echo contradicts.
         common = moved[..., 0].mean(axis=0)
         moved[..., 0] -= self.trend @ (self.trend.T @ common)
+        # A constant between the channels cannot be told from topography: it stays as recorded.
+        constant = moved.mean(axis=1, keepdims=True)
+        moved -= constant - constant.mean(axis=0)
         inverse = inverse.reshape(positions, channels, 3, channels, 3)
         own = np.stack([inverse[:, channel, :, channel] for channel in range(channels)])
         return _State(moved, own, self.variances(moved, inverse, prior), energy)

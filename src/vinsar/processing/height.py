@@ -52,7 +52,8 @@ variables.declare(
             "real",
             "m",
             "standard deviation of the height",
-            "from the data: noise, smoothing by filter and resolution cell, height reference",
+            "from the data: noise, smoothing by filter and resolution cell, height reference, what "
+            "autofocus leaves",
         ),
         "height_class": Variable(
             GRID,
@@ -415,6 +416,7 @@ def _dem(products: Products, study: Study) -> xr.Dataset:
         filtering=study.filtering.model_dump(),
         frequency=waveform.sampled(study.radar),
         windows=(study.imaging.range_window, study.imaging.aperture_window),
+        motion=products["autofocus"].isel(channel=[0, -1]),
         removed=removed,
     )
     return variables.dataset(
@@ -481,7 +483,7 @@ def _reference_exists(height: Height) -> Iterator[Fault]:
 STAGES = {
     "dem": Stage(
         _dem,
-        inputs=("unwrapped", "images", "interferogram", "filtered"),
+        inputs=("unwrapped", "images", "interferogram", "filtered", "autofocus"),
         sections=(
             *waveform.KEYS,
             "imaging.range_window",
