@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from vinsar.foundations import variables
 from vinsar.processing import assessment, filtering
@@ -45,6 +46,8 @@ def std_with(rail):
             for part in (left, smooth)
         ]
         corner = (slice(0, 8), slice(0, 8))
+        unmoved = xr.zeros_like(rail["transmitter"])
+        still = xr.Dataset({"displacement": unmoved, "displacement_std": unmoved})
         std, _ = assessment.assess(
             images,
             *products,
@@ -56,6 +59,7 @@ def std_with(rail):
             filtering={"method": method, **OPTIONS},
             frequency=FREQUENCY,
             windows=("rectangular", "rectangular"),
+            motion=still,
             removed=removed,
         )
         return std
