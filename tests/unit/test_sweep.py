@@ -1,4 +1,5 @@
 import dataclasses
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -442,3 +443,20 @@ def test_realizations_share_one_study(tiny):
     # A study is 20 kB in memory: each realization's own would be gigabytes in a large sweep.
     assert len({id(case.first) for case in cases}) == 4
     assert {case.study.realization for case in cases} == set(range(1000))
+
+
+def test_cases_that_err_on_purpose_warn_of_nothing(tiny, monkeypatch, caplog):
+    stage, doubted = pipeline.STAGES["dem"], []
+
+    def doubtful(products, study):
+        doubted.append(study)
+        logging.getLogger("vinsar.processing.assessment").warning("not known")
+        return stage.compute(products, study)
+
+    monkeypatch.setitem(pipeline.STAGES, "dem", dataclasses.replace(stage, compute=doubtful))
+    run(with_sweep(tiny, {"motion.level_wavelengths": [0.0, 0.07]}))
+    assert doubted
+    assert "not known" not in caplog.text
+    # Whoever runs a study afterwards in this process is warned again.
+    pipeline.run(tiny, only="dem")
+    assert "not known" in caplog.text

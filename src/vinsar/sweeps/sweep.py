@@ -52,6 +52,9 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+# What the stages of each case say.
+_stages_logger = logging.getLogger("vinsar.processing")
+
 _JUDGED = ("hidden_delivered", "visible_withheld")
 
 SWEEP: dict[str, Variable] = {
@@ -505,6 +508,8 @@ def run_case(case: Case, memo: Memo | None = None, given: Given | None = None) -
 
 
 def _run_block(given: Given, block: list[Case]) -> Results:
+    # Cases err on purpose, as their statistics tell; warnings of each would drown all others.
+    _stages_logger.setLevel(logging.ERROR)
     rows, errors = {}, {}
     for case in block:
         try:
@@ -582,7 +587,11 @@ def run(
         receive(({}, {case.key: reason for case in block}))
 
     if waiting:
-        compute(partial(_run_block, known), _blocks(waiting), receive, lost)
+        level = _stages_logger.level
+        try:
+            compute(partial(_run_block, known), _blocks(waiting), receive, lost)
+        finally:
+            _stages_logger.setLevel(level)
     if errors:
         listed = [f"{case}: {errors[case.key]}" for case in everything if case.key in errors]
         shown = "".join(f"\n  {line}" for line in listed[:10])
