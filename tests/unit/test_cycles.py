@@ -136,3 +136,12 @@ def test_the_window_is_an_odd_number_of_pixels_no_longer_than_asked():
     x, y = np.arange(5) * 0.02, np.arange(5) * 0.05
     assert cycles.window(0.2, x, y) == (5, 11)
     assert cycles.window(0.01, x, y) == (1, 1)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 41), (51, 1), (1, 1)])
+def test_an_image_of_one_row_or_column_has_its_constant(rows, columns):
+    channels, x, y = rails([0.05]), X[:columns], Y[:rows]
+    point = x[-1:], y[-1:], np.zeros(1)
+    found = cycles.constant(np.full((rows, columns), 0.4), tuple(channels), x, y, point, WAVELENGTH)
+    assert found == pytest.approx(-0.4, abs=1e-6)
+    assert cycles.window(0.25, x, y) == (1 if rows == 1 else 3, 1 if columns == 1 else 3)

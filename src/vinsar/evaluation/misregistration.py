@@ -15,7 +15,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing import focusing
+from vinsar.processing import focusing, interferogram
 from vinsar.radar import aperture, formulas, grid, trajectory, waveform
 from vinsar.radar.instrument import Instrument
 from vinsar.simulation import echo
@@ -320,17 +320,13 @@ def _heights_rise(registration: Registration) -> Iterator[Fault]:
         )
 
 
-def _of_two(study: Study) -> bool:
-    return study.measurement.channels != 1
-
-
 STAGES = {
     "registration": Stage(
         _registration,
         inputs=("trajectory",),
         sections=(*waveform.KEYS, "imaging", "registration"),
         parallel=True,
-        when=_of_two,
+        when=interferogram.of_two,
     ),
 }
 

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vinsar.foundations import tables, variables
+from vinsar.foundations.constants import NORMAL_PER_MAD
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
 from vinsar.processing import common_band, filtering, height, interferogram
-from vinsar.radar import aperture, trajectory, waveform
+from vinsar.radar import aperture, grid, trajectory, waveform
 from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
@@ -42,9 +43,6 @@ _NAMES = {
     "coherence": "registered by coherence",
     "refocused": "focused on the surface, common band",
 }
-
-NORMAL = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
 
 # Length of the near and of the far band along y, m.
 _BAND_M = 3.0
@@ -106,7 +104,7 @@ def true_place(lower: aperture.Aperture, x: Floats, y: Floats, truth: Floats) ->
     found = np.zeros(truth.shape)
     for _ in range(_ITERATIONS):
         place = common_band.place(lower, x, y, found)
-        row, column = (place[1] - y[0]) / (y[1] - y[0]), (place[0] - x[0]) / (x[1] - x[0])
+        row, column = grid.place(place[1], y), grid.place(place[0], x)
         found = map_coordinates(terrain, [row, column], order=1, mode="nearest")
     return common_band.place(lower, x, y, found)
 
@@ -125,7 +123,7 @@ def resample(image: Complexes, x: Floats, y: Floats, at: Floats) -> Complexes:
     """
     from scipy.ndimage import map_coordinates
 
-    places = [(at[1] - y[0]) / (y[1] - y[0]), (at[0] - x[0]) / (x[1] - x[0])]
+    places = [grid.place(at[1], y), grid.place(at[0], x)]
     real, imaginary = (map_coordinates(part, places, order=3) for part in (image.real, image.imag))
     return np.asarray(real + 1j * imaginary)
 
@@ -144,7 +142,7 @@ def by_coherence(lower: Complexes, upper: Complexes, x: Floats, y: Floats, phase
     """
     from scipy.ndimage import gaussian_filter, uniform_filter
 
-    sides = [max(1, round(_WINDOW_M / (axis[1] - axis[0]))) for axis in (y, x)]
+    sides = [max(1, round(_WINDOW_M / grid.step(axis))) for axis in (y, x)]
 
     def mean(values: Floats) -> Floats:
         return np.asarray(uniform_filter(values, sides, mode="nearest"))
@@ -285,7 +283,7 @@ def as_markdown(registered: xr.Dataset) -> str:
                     f"{1e3 * left:.1f}",
                     f"{left / cell:.3f}",
                     f"{100 * float(part['height_std']):.2f}",
-                    f"{100 * NORMAL * float(part['height_mad']):.2f}",
+                    f"{100 * NORMAL_PER_MAD * float(part['height_mad']):.2f}",
                 )
             )
     heads = (

@@ -13,7 +13,7 @@ from vinsar.foundations import variables
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
 from vinsar.processing import height, interferogram, unwrapping
-from vinsar.radar import waveform
+from vinsar.radar import grid, waveform
 from vinsar.radar.instrument import Instrument
 from vinsar.simulation import scene
 
@@ -97,7 +97,7 @@ def compare(
     true, visible = truth["height"].values, ~truth["shadow"].values
     visible &= np.isfinite(true)
     tops = [visible & (scene.relief(part, x[None, :], y[:, None]) != 0) for part in objects]
-    reach = [1 + 2 * int(np.ceil(_BESIDE_M / (axis[1] - axis[0]))) for axis in (y, x)]
+    reach = [1 + 2 * int(np.ceil(_BESIDE_M / grid.step(axis))) for axis in (y, x)]
     near = binary_dilation(np.any([np.zeros(true.shape, bool), *tops], axis=0), np.ones(reach))
     stacked = np.stack(list(heights.values()))
     wrong = np.abs(stacked - true) > ambiguity / 2

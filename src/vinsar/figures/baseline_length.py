@@ -9,6 +9,7 @@ import numpy as np
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import swept_section
+from vinsar.foundations.constants import NORMAL_PER_MAD
 from vinsar.radar import instrument
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ def _spreads(axes: Axes, sweep: xr.Dataset, at: Floats) -> Floats:
     parts = (
         (sweep["std"].sel(region="whole_scene"), sweeps.WHOLE, 100.0),
         (sweep["std"].sel(region="visible_ground"), sweeps.VISIBLE, 100.0),
-        (sweep["mad"].sel(region="visible_ground"), sweeps.CORE, 100.0 * sweeps.NORMAL),
+        (sweep["mad"].sel(region="visible_ground"), sweeps.CORE, 100.0 * NORMAL_PER_MAD),
     )
     for data, look, scale in parts:
         sweeps.curve(axes, at, data, look, scale=scale)

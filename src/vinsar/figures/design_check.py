@@ -10,7 +10,7 @@ from vinsar.figures.design import OF_AXES, changed
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import swept_section
-from vinsar.foundations.constants import AXES
+from vinsar.foundations.constants import AXES, NORMAL_PER_MAD
 from vinsar.prediction import design
 from vinsar.radar import trajectory
 
@@ -111,7 +111,7 @@ def _sheet(study: Study, sweep: str, **changes: dict[str, Any]) -> design.Sheet:
 
 def _spread(sweep: Any) -> Floats:
     measured = sweep["mad"].sel(region="visible_ground").mean("realization")
-    return np.asarray(sweeps.NORMAL * measured.values)
+    return np.asarray(NORMAL_PER_MAD * measured.values)
 
 
 def _by_noise(products: Products, study: Study) -> tuple[Floats, Floats]:

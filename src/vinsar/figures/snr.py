@@ -9,6 +9,7 @@ import numpy as np
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import swept_section
+from vinsar.foundations.constants import NORMAL_PER_MAD
 from vinsar.radar import instrument, speckle
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _PARTS = (
     ("std", "whole_scene", 1.0, sweeps.WHOLE),
     ("std", "visible_ground", 1.0, sweeps.VISIBLE),
-    ("mad", "visible_ground", sweeps.NORMAL, sweeps.CORE),
+    ("mad", "visible_ground", NORMAL_PER_MAD, sweeps.CORE),
 )
 
 

@@ -17,6 +17,9 @@ def channel_names(count: int) -> tuple[str, ...]:
     return (CHANNELS[0], *between, CHANNELS[1]) if count > 1 else CHANNELS[:count]
 
 
+NORMAL_PER_MAD: Final = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
 AXES: Final = ("x", "y", "z")
 """Right-handed axes in metres: x along the rail, y forward, z up."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vinsar.processing import classification, masks, uncertainty
 from vinsar.processing.filtering import response_to
-from vinsar.radar import aperture, waveform
+from vinsar.radar import aperture, grid, waveform
 from vinsar.radar.instrument import Instrument
 
 if TYPE_CHECKING:
@@ -127,19 +127,17 @@ def assess(
     )
     absolute = np.where(np.isfinite(phase), phase, flat)
     bandwidth = float(frequency[-1] - frequency[0]) / waveform.carrier(frequency)
-    known = np.zeros(product.shape) if removed is None else removed
-    turn = np.exp(1j * known).astype(np.complex64)
-    left, told = product / turn, absolute if removed is None else absolute - flat - known
+    seen, left, passed, told, level = pictures, product, smooth, absolute, flat
+    if removed is not None:
+        turn = np.exp(1j * removed).astype(np.complex64)
+        seen = np.stack([pictures[0], pictures[1] * turn])
+        left, passed = product / turn, smooth / turn
+        told, level = absolute - flat - removed, np.zeros(product.shape)
     filter_ = response_to(left, **filtering)
     noise = uncertainty.estimate(
-        np.stack([pictures[0], pictures[1] * turn]),
-        told,
-        flat if removed is None else np.zeros(product.shape),
-        resolution=resolution,
-        spacing=spacing,
-        relative_bandwidth=bandwidth,
+        seen, told, level, resolution=resolution, spacing=spacing, relative_bandwidth=bandwidth
     )
-    by_noise = uncertainty.noise_variance(noise, filter_, left, smooth / turn, spacing=spacing)
+    by_noise = uncertainty.noise_variance(noise, filter_, left, passed, spacing=spacing)
     taken = uncertainty.smoothing(filter_, left, resolution=resolution, spacing=spacing)
     wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
     own = np.minimum(by_noise + uncertainty.mean(taken**2, wide), uncertainty.UNIFORM)
@@ -250,9 +248,8 @@ def doubts(
 
 
 def _spacing(x: Floats, y: Floats) -> tuple[float, float]:
-    """Return the spacing of the pixels in x and y, m; of a single one as if it were a metre."""
-    across, ahead = (float(axis[1] - axis[0]) if axis.size > 1 else 1.0 for axis in (x, y))
-    return across, ahead
+    """Return the spacing of the pixels in x and y, m."""
+    return grid.step(x), grid.step(y)
 
 
 def _noise_width(name: waveform.WindowName) -> float:

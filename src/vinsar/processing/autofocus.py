@@ -32,7 +32,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing import focusing, health, leakage
+from vinsar.processing import focusing, leakage
 from vinsar.radar import grid, trajectory, waveform
 
 if TYPE_CHECKING:
@@ -763,9 +763,7 @@ def _autofocus(products: Products, study: Study) -> xr.Dataset:
         found = Motion(nothing, nothing, still, still, (np.nan, np.nan))
     else:
         x, y = grid.image_axes(study.imaging)
-        echo = leakage.suppress(
-            health.sound(products["received"]), **study.suppression.model_dump()
-        )
+        echo = leakage.clean(products["received"], study)
         found = estimate(echo, recorded, extent=(x[0], x[-1], y[0], y[-1]))
     return variables.dataset(
         "autofocus",

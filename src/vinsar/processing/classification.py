@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.processing import uncertainty
-from vinsar.radar import aperture
+from vinsar.radar import aperture, grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -188,7 +188,7 @@ def split_band(
     """
     from scipy.ndimage import uniform_filter
 
-    spacing = float(x[1] - x[0]) if x.size > 1 else 1.0, float(y[1] - y[0])
+    spacing = grid.step(x), grid.step(y)
     if spacing[1] >= float(resolution[1].min()):
         none = Cycles(np.zeros(phase.shape), np.full(phase.shape, np.inf))
         return [none for _ in SPLIT_LOOKS]
@@ -290,7 +290,7 @@ class Fan:
                 f"the antenna at y = {antenna[1]:.2f} m is not before the image, which begins at "
                 f"y = {y[0]:.2f} m"
             )
-        spacing = float(x[1] - x[0])
+        spacing = grid.step(x)
         ends = [(x[side] - antenna[0]) / ahead[row] for side in (0, -1) for row in (0, -1)]
         left, right = min(ends), max(ends)
         count = int(np.ceil(2 * (right - left) * ahead[-1] / spacing)) + 2
@@ -542,7 +542,7 @@ def classify(
     """
     fans = [Fan.over(antenna, x, y) for antenna in antennas]
     outside = ~np.isfinite(height)
-    reach = max(1, window_px[0] // 2) * float(y[1] - y[0])
+    reach = max(1, window_px[0] // 2) * grid.step(y)
     low = np.zeros(height.shape, bool)
     if fans:
         lowest = min(fans, key=lambda fan: float(fan.antenna[2]))

@@ -27,8 +27,8 @@ from vinsar.foundations import blocks, variables
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import filtering, health, height, interferogram, leakage
-from vinsar.radar import aperture, trajectory, waveform
+from vinsar.processing import filtering, height, interferogram, leakage
+from vinsar.radar import aperture, grid, trajectory, waveform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -361,8 +361,7 @@ def _refined(products: Products, study: Study) -> xr.Dataset:
     images, unwrapped = products["images"], products["unwrapped"]
     x, y = images["x"].values, images["y"].values
     ends = [0, -1]
-    echo = leakage.suppress(health.sound(products["received"]), **study.suppression.model_dump())
-    echo = echo.isel(channel=ends)
+    echo = leakage.clean(products["received"], study).isel(channel=ends)
     frequency = echo["frequency"].values
     channels = trajectory.apertures(images)
     wavelength = float(images["wavelength"])
@@ -372,7 +371,7 @@ def _refined(products: Products, study: Study) -> xr.Dataset:
     found = surface(
         first.image_height,
         np.abs(images["image"].values[0]) ** 2,
-        std_px=[study.imaging.surface_std_m / (axis[1] - axis[0]) for axis in (y, x)],
+        std_px=[study.imaging.surface_std_m / grid.step(axis) for axis in (y, x)],
     )
     point = place(channels[0], x, y, found)
     positions = echo.sizes["position"]

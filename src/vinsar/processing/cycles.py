@@ -20,7 +20,7 @@ from vinsar.foundations import variables
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
 from vinsar.processing import filtering, height, masks
-from vinsar.radar import aperture, trajectory
+from vinsar.radar import aperture, grid, trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,8 +86,7 @@ def constant(
     image_x, image_y = aperture.image_position(pair[0], *points)
     expected = aperture.interferometric_phase(*pair, *points, wavelength_m)
     expected = expected - aperture.flat_earth_phase(*pair, image_x, image_y, wavelength_m)
-    place = [(image_y - y[0]) / (y[1] - y[0]), (image_x - x[0]) / (x[1] - x[0])]
-    row, column = (np.rint(axis).astype(int) for axis in place)
+    row, column = (np.rint(grid.place(*ends)).astype(int) for ends in ((image_y, y), (image_x, x)))
     row, column = np.clip(row, 0, y.size - 1), np.clip(column, 0, x.size - 1)
     missing = (expected - phase[row, column])[np.isfinite(phase[row, column])]
     if not missing.size:
@@ -229,7 +228,7 @@ def settle(
 
 def window(side_m: float, x: Floats, y: Floats) -> tuple[int, int]:
     """Return the sides of a window in y and x, odd numbers of pixels of at most that length."""
-    down, across = (2 * int(side_m / (axis[1] - axis[0]) / 2) + 1 for axis in (y, x))
+    down, across = (2 * int(side_m / grid.step(axis) / 2) + 1 for axis in (y, x))
     return down, across
 
 

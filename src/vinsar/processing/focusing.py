@@ -12,7 +12,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing import health, leakage
+from vinsar.processing import leakage
 from vinsar.radar import grid, motion, trajectory, waveform
 from vinsar.radar.trajectory import ANTENNAS
 
@@ -363,7 +363,7 @@ def _profiles(products: Products, study: Study) -> xr.Dataset:
     margin = min(_PROFILE_MARGIN_M, 0.49 * (repeated - far + near))
     begin = _PROFILE_STEP_M * np.floor((near - margin) / _PROFILE_STEP_M)
     return compress(
-        leakage.suppress(health.sound(products["received"]), **study.suppression.model_dump()),
+        leakage.clean(products["received"], study),
         near_range_m=max(0.0, float(begin), far + margin - repeated),
         far_range_m=far + margin,
         window=study.imaging.range_window,

@@ -188,7 +188,7 @@ def phase_offset(
     wavelength = float(images["wavelength"])
     point_x, point_y, point_height = points
     image_x, image_y = aperture.image_position(lower, point_x, point_y, point_height)
-    row, column = _place(image_y, y), _place(image_x, x)
+    row, column = grid.place(image_y, y), grid.place(image_x, x)
     # A pixel's width of tolerance: declared ground may end at the image's edge.
     inside = (row > -1) & (row < y.size) & (column > -1) & (column < x.size)
     if not inside.all():
@@ -228,12 +228,6 @@ def phase_offset(
     )
     plane = constant + slope_x * x[None, :] + slope_y * (y[:, None] - y[0])
     return np.asarray(plane + turns[numbers])
-
-
-def _place(values: Floats, axis: Floats) -> Floats:
-    """Return where values are on an axis, in its steps; of a single pixel, as if a metre wide."""
-    step = axis[1] - axis[0] if axis.size > 1 else 1.0
-    return np.asarray((values - axis[0]) / step)
 
 
 def _turns(missing: Floats, island: NDArray[np.integer], count: int) -> Floats:

@@ -138,13 +138,14 @@ def _odd_window(interferogram: Interferogram) -> Iterator[Fault]:
         yield Fault("interferogram.coherence_window_px", window, "must be odd")
 
 
-def _of_two(study: Study) -> bool:
+def of_two(study: Study) -> bool:
+    """Tell whether a study has two channels; a measurement may have one."""
     return study.measurement.channels != 1
 
 
 STAGES = {
     "interferogram": Stage(
-        _interferogram, inputs=("images",), sections=("interferogram",), when=_of_two
+        _interferogram, inputs=("images",), sections=("interferogram",), when=of_two
     ),
 }
 

@@ -14,11 +14,14 @@ import numpy as np
 from vinsar.foundations import variables
 from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
+from vinsar.processing import health
 from vinsar.radar import waveform
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
+
+    from vinsar.foundations.configuration import Study
 
 Method = Literal["none", "gate", "common", "both"]
 METHODS: tuple[Method, ...] = ("none", "gate", "common", "both")
@@ -38,6 +41,19 @@ class Suppression(Section, name="suppression"):
         "future work",
     )
     gate_range_m: float = key("slant range up to which the gate removes returns", "ours", gt=0)
+
+
+def clean(received: xr.Dataset, study: Study) -> xr.Dataset:
+    """Return the echo as all processing takes it: of sound positions, with the coupling suppressed.
+
+    Parameters
+    ----------
+    received
+        Product ``received``.
+    study
+        The configuration, with its section ``suppression``.
+    """
+    return suppress(health.sound(received), **study.suppression.model_dump())
 
 
 def suppress(echo: xr.Dataset, *, method: Method, gate_range_m: float) -> xr.Dataset:

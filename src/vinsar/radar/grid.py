@@ -55,6 +55,16 @@ def pixel_side(imaging: Any) -> float:
     return x if x == y else float(np.sqrt(x * y))
 
 
+def step(axis: Floats) -> float:
+    """Return the step of an even axis, m; of a single pixel, as if it were a metre wide."""
+    return float(axis[1] - axis[0]) if axis.size > 1 else 1.0
+
+
+def place(values: Floats, axis: Floats) -> Floats:
+    """Return where values lie on an even axis, in steps from its first pixel."""
+    return np.asarray((values - axis[0]) / step(axis))
+
+
 def image_axes(imaging: Any) -> tuple[Floats, Floats]:
     """Return the axes x and y of image and DEM, m.
 

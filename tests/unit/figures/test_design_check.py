@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vinsar.figures import FIGURES
-from vinsar.figures.drawing import sweeps
+from vinsar.foundations.constants import NORMAL_PER_MAD
 
 
 def test_it_is_as_wide_as_a_column(usual):
@@ -17,7 +17,7 @@ def test_it_shows_the_measured_spread_of_every_noise_level(usual, lines_of, prod
     axes = usual("design_check").axes[0]
     measured = products["sweeps/snr"]["mad"].sel(region="visible_ground").mean("realization")
     shown = lines_of(axes)["signal-to-noise ratio"].get_ydata()
-    np.testing.assert_allclose(shown, 100 * sweeps.NORMAL * measured)
+    np.testing.assert_allclose(shown, 100 * NORMAL_PER_MAD * measured)
 
 
 def test_the_caption_gives_the_range_of_the_ratio(usual, lines_of, products, study):

@@ -37,9 +37,6 @@ class Look:
     marker: str
 
 
-# A normal distribution's standard deviation by its median absolute deviation.
-NORMAL = 1.4826
-
 WHOLE = Look("std, whole scene", style.INK, "-", "o")
 VISIBLE = Look("std, visible ground", style.BLUE, style.DASHED, "s")
 CORE = Look("1.48 MAD, visible ground", style.ORANGE, style.DASH_DOTTED, "^")
