@@ -5,7 +5,6 @@ A rule is called with the sections that its parameters name and yields what is w
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from vinsar.foundations.errors import Fault
 from vinsar.radar import aperture, grid, instrument, motion, trajectory, waveform
 from vinsar.radar.instrument import Instrument
+from vinsar.study import work
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -447,7 +447,7 @@ def _antennas_fit(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
     samples = (radar.aperture_length_m / radar.position_spacing_m + 1) * radar.frequency_count
     # Echoes clean and received, of 16 bytes a sample, and images of 8 bytes a pixel.
     needed = (2 * 16 * samples + 8 * pixels) * (len(radar.baselines) + 1)
-    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    there = work.memory()
     if needed > there / 2:
         yield Fault(
             "radar.baselines_m",
