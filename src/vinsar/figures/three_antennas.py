@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vinsar.figures.chain import withheld
 from vinsar.figures.drawing import declaration, maps, style, sweeps
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def draw(products: Products, study: Study) -> Figure:
     Parameters
     ----------
     products
-        ``truth``, ``two_antennas``.
+        ``dem``, ``truth``, ``two_antennas``.
     study
         The configuration.
 
@@ -56,6 +57,7 @@ def draw(products: Products, study: Study) -> Figure:
         if place == 0:
             _number(axes, study)
         if place == len(shown) - 1:
+            maps.hatch(axes, withheld(products["dem"]))
             ends = maps.beyond(np.stack([part.values for part, _ in shown]), (-top, top))
             maps.colorbar(axes, image, "height (cm)", extend=ends)
     style.write_title(figure, 13.0, below - 7, "(d) height of the objects, true and reported")
@@ -126,10 +128,11 @@ FIGURES = {
             "Objects taller than half the longest baseline's height of ambiguity: true height, "
             "height by the lower and the upper antenna alone, unwrapped, and by all antennas, "
             "whose shorter baselines settle the cycle. Below, the median height of each object's "
-            "visible ground, in the order of the scene. Heights are drawn whatever their class."
+            "visible ground, in the order of the scene. What is not delivered by all antennas is "
+            "hatched; heights by two have no class of their own."
         ),
         sections=("figures", "scene"),
-        inputs=("truth", "two_antennas"),
+        inputs=("dem", "truth", "two_antennas"),
         numbers=numbers,
     ),
 }
