@@ -457,7 +457,7 @@ def _spread(accuracy: xr.Dataset) -> Claim:
         f"standard deviation {100 * std:.2f} cm over the whole scene, {100 * seen:.2f} cm on "
         f"visible ground, {100 * held:.2f} cm of what is delivered",
         "reproduced if the whole scene's is at or below 4.5 cm, partly up to twice that",
-        _verdict(std <= 0.045, std <= 0.09),
+        _verdict(std <= PAPER_STD_M, std <= 2 * PAPER_STD_M),
         {"std_m": std, "std_visible_m": seen, "std_delivered_m": held},
     )
 
