@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import signal
+import time
 
 import numpy as np
+import psutil
 import pytest
 from hypothesis import settings
 
@@ -29,6 +32,19 @@ def pytest_collection_modifyitems(config, items):
     if hasattr(config, "workerinput"):
         slow = ("cluster", "workflow")
         items.sort(key=lambda item: not any(name in item.path.parts for name in slow))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _nothing_stays_open():
+    """Blame a module for the files and sockets that it leaves open, not the tests after it."""
+    before = psutil.Process().net_connections(kind="inet")
+    yield
+    gc.collect()
+    # A thread may still be closing what it had.
+    until = time.monotonic() + 10
+    while left := set(psutil.Process().net_connections(kind="inet")) - set(before):
+        assert time.monotonic() < until, left
+        time.sleep(0.05)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from typing import Any
 from urllib.request import ProxyHandler, build_opener
 
 import pytest
-from tornado.websocket import websocket_connect
+from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SECONDS = 60
@@ -83,6 +83,18 @@ def _address(profile: Path) -> str:
 
 async def _visit(address: str, pages: list[Path], expression: str) -> list[Page]:
     socket = await websocket_connect(address, max_message_size=2**28)
+    try:
+        return await _converse(socket, pages, expression)
+    finally:
+        socket.close()
+        # The connection ends when the browser has agreed; until then its descriptor stays open.
+        while await asyncio.wait_for(socket.read_message(), SECONDS) is not None:
+            pass
+
+
+async def _converse(
+    socket: WebSocketClientConnection, pages: list[Path], expression: str
+) -> list[Page]:
     number = 0
     events: list[dict[str, Any]] = []
 
@@ -121,5 +133,4 @@ async def _visit(address: str, pages: list[Path], expression: str) -> list[Page]
             if event.get("method") == "Network.requestWillBeSent"
         ]
         visited.append(Page(requested, result["result"]["value"]))
-    socket.close()
     return visited
