@@ -68,6 +68,18 @@ def test_a_stage_cannot_read_a_section_that_it_does_not_declare(study, products,
         pipeline.run_stage("filtered", products, study)
 
 
+def test_no_stage_delivers_values_that_cannot_be(study, products, monkeypatch):
+    def broken(inputs, part):
+        made = stage.compute(inputs, part)
+        made["coherence"][3, 4] = np.nan
+        return made
+
+    stage = pipeline.STAGES["interferogram"]
+    monkeypatch.setitem(pipeline.STAGES, "interferogram", replace(stage, compute=broken))
+    with pytest.raises(ValueError, match="'coherence' in product 'interferogram' are missing"):
+        pipeline.run_stage("interferogram", products, study)
+
+
 def test_a_run_is_the_same_bits_however_many_threads(study, products):
     with dask.config.set(scheduler="synchronous"):
         again = pipeline.run(study, only="dem")

@@ -121,3 +121,57 @@ def test_inputs_are_not_changed_and_results_come_in_one_order():
     second = variables.dataset("terrain", data, dict(reversed(coords.items())))
     assert coords.keys() == kept.keys()
     assert list(first.variables) == list(second.variables)
+
+
+def interferogram(**changes):
+    values = {"interferogram": np.ones((2, 3), np.complex64), "coherence": np.full((2, 3), 0.5)}
+    for name, value in changes.items():
+        values[name][1, 2] = value
+    axes = {"y": np.arange(2.0), "x": np.arange(3.0)}
+    return variables.dataset("interferogram", values, axes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"coherence": np.nan}, "1 of the 6 values of 'coherence' .* are missing; .* x number 2"),
+        ({"interferogram": np.nan * 1j}, "'interferogram' .* are missing"),
+        ({"coherence": np.inf}, "'coherence' .* are infinite; the first at y number 1, x number 2"),
+        ({"interferogram": complex(0, -np.inf)}, "'interferogram' .* are infinite"),
+        ({"coherence": 1.001}, "'coherence' .* are outside 0 to 1"),
+        ({"coherence": -0.001}, "'coherence' .* are outside 0 to 1"),
+    ],
+)
+def test_values_that_cannot_be_are_refused_by_name_and_place(changes, message):
+    with pytest.raises(ValueError, match=message):
+        variables.refuse_values(interferogram(**changes), "interferogram")
+
+
+def test_what_is_bounded_may_reach_its_bound_and_a_rounding_more():
+    variables.refuse_values(interferogram(coherence=1.0 + 1e-7), "interferogram")
+    variables.refuse_values(interferogram(coherence=0.0), "interferogram")
+
+
+def test_values_may_be_missing_where_something_misses_in_what_they_are_made_from():
+    whole, lacking = interferogram(), interferogram(coherence=np.nan)
+    variables.refuse_values(lacking, "interferogram", {"filtered": whole, "images": lacking})
+    with pytest.raises(ValueError, match="are missing"):
+        variables.refuse_values(lacking, "interferogram", {"filtered": whole})
+    # Nor do gaps excuse what else is wrong.
+    wrong = interferogram(coherence=np.nan)
+    wrong["coherence"][0, 0] = 2.0
+    with pytest.raises(ValueError, match=r"1 of the 6 .* outside 0 to 1"):
+        variables.refuse_values(wrong, "interferogram", {"images": lacking})
+
+
+def test_a_class_without_a_word_is_refused():
+    found = variables.PRODUCTS["dem"]["height_class"]
+    assert found.limits == (0, len(found.flag_meanings.split()) - 1)
+    data = variables.dataset(
+        "dem",
+        {name: np.zeros((1, 1)) for name in variables.PRODUCTS["dem"]}
+        | {"height_class": np.full((1, 1), found.limits[1] + 1, np.int8)},
+        {"y": [0.0], "x": [0.0]},
+    )
+    with pytest.raises(ValueError, match=r"1 of the 1 values of 'height_class' .* outside 0 to 5"):
+        variables.refuse_values(data, "dem")

@@ -127,6 +127,7 @@ variables.declare(
         ),
         "sigmas": Variable(("sigmas",), "integer", "1", "number of standard deviations"),
     },
+    statistics=True,
 )
 
 BINS = 5

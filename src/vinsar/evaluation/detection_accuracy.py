@@ -99,6 +99,7 @@ variables.declare(
             ("amplitude_threshold",), "real", "1", "threshold of the 2-D detector, a power ratio"
         ),
     },
+    statistics=True,
 )
 
 

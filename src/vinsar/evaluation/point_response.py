@@ -43,7 +43,7 @@ VARIABLES = {
 }
 """Variables of the product ``focus``."""
 
-variables.declare("focus", VARIABLES)
+variables.declare("focus", VARIABLES, statistics=True)
 
 
 def _focus(products: Products, study: Study) -> xr.Dataset:

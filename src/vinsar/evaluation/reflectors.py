@@ -63,6 +63,7 @@ variables.declare(
             ("cell_offset",), "real", "1", "offset from the survey, in resolution cells"
         ),
     },
+    statistics=True,
 )
 
 

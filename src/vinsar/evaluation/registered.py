@@ -78,6 +78,7 @@ variables.declare(
         "band": Variable(("band",), "label", "", "part of the scene by distance"),
         "end": Variable(("end",), "integer", "1", "near or far edge"),
     },
+    statistics=True,
 )
 
 

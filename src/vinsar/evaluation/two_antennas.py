@@ -61,6 +61,7 @@ variables.declare(
         ),
         "object": Variable(("object",), "integer", "1", "number of the object of the scene"),
     },
+    statistics=True,
 )
 
 

@@ -56,6 +56,10 @@ class Variable:
     flag_meanings
         For flags: the words for false and true. For integers that are classes: the words for 0, 1
         and so on.
+    bounds
+        The least and the largest value that there can be.
+    gaps
+        Whether values may be missing (NaN) though nothing misses in what it is made from.
     """
 
     dims: tuple[str, ...]
@@ -64,6 +68,15 @@ class Variable:
     long_name: str
     comment: str = ""
     flag_meanings: str = ""
+    bounds: tuple[float, float] = (-np.inf, np.inf)
+    gaps: bool = False
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The bounds of its values; of classes, those that have a word."""
+        if self.kind == "integer" and self.flag_meanings:
+            return 0, len(self.flag_meanings.split()) - 1
+        return self.bounds
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -104,6 +117,7 @@ PRODUCTS: dict[str, dict[str, Variable]] = {}
 """The variables of each product, as the modules declare them."""
 
 _CHECKS: dict[str, Callable[[xr.Dataset], None]] = {}
+_STATISTICS: set[str] = set()
 
 
 def declare(
@@ -112,6 +126,7 @@ def declare(
     *,
     coordinates: Mapping[str, Variable] | None = None,
     check: Callable[[xr.Dataset], None] | None = None,
+    statistics: bool = False,
 ) -> None:
     """Declare a product; the module that makes it does so once.
 
@@ -125,6 +140,8 @@ def declare(
         The coordinates of dimensions that no other product has.
     check
         What refuses a dataset that departs from the declaration, if not `check`.
+    statistics
+        Whether its values are of parts of the scene that may be empty, and are missing then.
 
     Raises
     ------
@@ -138,6 +155,8 @@ def declare(
             raise ValueError(f"coordinate '{name}' is declared already, and otherwise")
     if check is not None:
         _CHECKS[product] = check
+    if statistics:
+        _STATISTICS.add(product)
 
 
 LABELS: dict[str, tuple[str, ...]] = {"axis": AXES, "ground_axis": AXES[:2]}
@@ -300,3 +319,79 @@ def check(data: xr.Dataset, product: str) -> None:
                     f"'{name}' of product '{product}' has {attribute}="
                     f"{array.attrs.get(attribute)!r}, but {value!r} is declared"
                 )
+
+
+# A coherence of 1 may be computed as a rounding more.
+_ROUNDING = 1e-6
+
+
+def refuse_values(
+    data: xr.Dataset, product: str, made_from: Mapping[str, xr.Dataset] | None = None
+) -> None:
+    """Refuse values that cannot be: infinite, out of bounds, missing without a reason.
+
+    Parameters
+    ----------
+    data
+        A product as declared (`check`).
+    product
+        A key of `PRODUCTS`.
+    made_from
+        What it was made from. Where values of these are missing, its own may be.
+
+    Raises
+    ------
+    ValueError
+        Names the first such variable, how many of its values there are, and where the first is.
+    """
+
+    def may_miss(variable: Variable) -> bool:
+        return (
+            variable.gaps or product in _STATISTICS or any(map(_gaps, (made_from or {}).values()))
+        )
+
+    for name, variable in PRODUCTS[product].items():
+        if variable.kind in ("flag", "label") or name not in data.variables:
+            continue
+        array = data.variables[name]
+        both = variable.kind == "complex"
+        for values in (array.values.real, array.values.imag) if both else (array.values,):
+            fault = _fault(values, variable, may_miss)
+            if fault is not None:
+                what, wrong = fault
+                first = zip(array.dims, np.argwhere(wrong)[0], strict=True)
+                where = ", ".join(f"{dim} number {number}" for dim, number in first)
+                raise ValueError(
+                    f"{wrong.sum()} of the {wrong.size} values of '{name}' in product '{product}' "
+                    f"{what}" + (f"; the first at {where}" if where else "")
+                )
+
+
+def _fault(
+    values: NDArray[Any], variable: Variable, may_miss: Callable[[Variable], bool]
+) -> tuple[str, NDArray[np.bool_]] | None:
+    """Return what is wrong with some of the values, and with which."""
+    if values.size == 0:
+        return None
+    least, largest = variable.limits
+    # The extremes tell at the cost of reading the values twice whether anything is wrong at all.
+    low, high = values.min(), values.max()
+    if np.isnan(low):
+        if not may_miss(variable):
+            return "are missing", np.isnan(values)
+        values = np.where(np.isnan(values), least if np.isfinite(least) else 0, values)
+        low, high = values.min(), values.max()
+    if not np.isfinite([low, high]).all():
+        return "are infinite", np.isinf(values)
+    if low < least - _ROUNDING or high > largest + _ROUNDING:
+        wrong = (values < least - _ROUNDING) | (values > largest + _ROUNDING)
+        return f"are outside {least:g} to {largest:g}", wrong
+    return None
+
+
+def _gaps(product: xr.Dataset) -> bool:
+    return any(
+        np.isnan(variable.values).any()
+        for variable in product.variables.values()
+        if variable.dtype.kind in "fc"
+    )

@@ -106,6 +106,8 @@ variables.declare(
             "m",
             "standard deviation of the displacement",
             "NaN where the echoes tell nothing; 0 where the recorded positions are taken as exact",
+            bounds=(0, np.inf),
+            gaps=True,
         ),
         "range_correction": Variable(
             ("channel", "position"),
@@ -120,12 +122,22 @@ variables.declare(
             "m",
             "standard deviation of the range correction",
             "NaN where the echoes tell nothing; 0 where the recorded positions are taken as exact",
+            bounds=(0, np.inf),
+            gaps=True,
         ),
         "focus_recorded": Variable(
-            (), "real", "1", "share of the full coherence among the recorded positions"
+            (),
+            "real",
+            "1",
+            "share of the full coherence among the recorded positions",
+            gaps=True,
         ),
         "focus_corrected": Variable(
-            (), "real", "1", "share of the full coherence among the corrected positions"
+            (),
+            "real",
+            "1",
+            "share of the full coherence among the corrected positions",
+            gaps=True,
         ),
     },
 )

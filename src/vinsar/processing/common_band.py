@@ -83,7 +83,13 @@ variables.declare(
         ),
         "interferogram": Variable(GRID, "complex", "1", "interferogram of these"),
         "filtered": Variable(GRID, "complex", "1", "filtered interferogram of these"),
-        "coherence": Variable(GRID, "real", "1", "multilooked coherence magnitude of these"),
+        "coherence": Variable(
+            GRID,
+            "real",
+            "1",
+            "multilooked coherence magnitude of these",
+            bounds=(0, 1),
+        ),
         "surface": Variable(
             GRID, "real", "m", "height of the surface that the image's pixel is focused on"
         ),
@@ -95,7 +101,11 @@ variables.declare(
             "without the flat-earth phase",
         ),
         "shared": Variable(
-            GRID, "real", "1", "share of band times aperture that both channels have in common"
+            GRID,
+            "real",
+            "1",
+            "share of band times aperture that both channels have in common",
+            bounds=(0, 1),
         ),
     },
 )

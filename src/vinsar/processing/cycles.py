@@ -45,6 +45,7 @@ variables.declare(
             "radian",
             "phase of the longest baseline by the shorter ones, without the flat-earth phase",
             "lower minus upper; not a number where they locate nothing",
+            gaps=True,
         ),
     },
 )

@@ -60,6 +60,7 @@ variables.declare(
             "m",
             "height above the ground beneath where it exceeds its noise",
             "0 where it does not, not a number where the height is not valid",
+            gaps=True,
         ),
         "map_class": Variable(
             GRID,
@@ -75,6 +76,7 @@ variables.declare(
             "1",
             "multilooked power of the images over that of their surroundings",
             "at the image's pixel, before DEM coding",
+            bounds=(0, np.inf),
         ),
         "bright": Variable(
             GRID,
@@ -87,7 +89,13 @@ variables.declare(
         "detected_y": Variable(_DETECTED, "real", "m", "centre of the detected area along y"),
         "extent_x": Variable(_DETECTED, "real", "m", "extent of the detected area along x"),
         "extent_y": Variable(_DETECTED, "real", "m", "extent of the detected area along y"),
-        "detected_area": Variable(_DETECTED, "real", "m2", "detected area"),
+        "detected_area": Variable(
+            _DETECTED,
+            "real",
+            "m2",
+            "detected area",
+            bounds=(0, np.inf),
+        ),
         "detected_height": Variable(
             _DETECTED,
             "real",

@@ -46,6 +46,7 @@ variables.declare(
             "m",
             "reconstructed height above the ground plane",
             "known where height_class is valid alone",
+            gaps=True,
         ),
         "height_std": Variable(
             GRID,
@@ -54,6 +55,8 @@ variables.declare(
             "standard deviation of the height",
             "from the data: noise, smoothing by filter and resolution cell, height reference, what "
             "autofocus leaves",
+            bounds=(0, np.inf),
+            gaps=True,
         ),
         "height_class": Variable(
             GRID,

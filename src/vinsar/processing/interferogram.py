@@ -33,7 +33,13 @@ variables.declare(
         "interferogram": Variable(
             GRID, "complex", "1", "interferogram, lower times conjugate upper (Eq. 10)"
         ),
-        "coherence": Variable(GRID, "real", "1", "multilooked coherence magnitude"),
+        "coherence": Variable(
+            GRID,
+            "real",
+            "1",
+            "multilooked coherence magnitude",
+            bounds=(0, 1),
+        ),
     },
 )
 

@@ -50,6 +50,7 @@ variables.declare(
             "1",
             "residue of the filtered phase",
             "winding number of the four cells whose least x and y are this one's: -1, 0 or 1",
+            bounds=(-1, 1),
         ),
     },
 )

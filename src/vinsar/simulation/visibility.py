@@ -59,7 +59,11 @@ variables.declare(
         "height": Variable(GRID, "real", "m", "true height on the DEM's grid"),
         "reflectivity": Variable(GRID, "real", "1", "reflectivity on the DEM's grid"),
         "visible_fraction": Variable(
-            ("channel", "y", "x"), "real", "1", "share of the antenna positions that see the cell"
+            ("channel", "y", "x"),
+            "real",
+            "1",
+            "share of the antenna positions that see the cell",
+            bounds=(0, 1),
         ),
         "shadow": SHADOW,
     },

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from vinsar.foundations import variables
 from vinsar.study.composition import STAGES
 from vinsar.study.options import SIMULATION
 
@@ -68,20 +69,28 @@ def run_stage(name: str, products: Mapping[str, xr.Dataset], study: Study) -> xr
     -------
     xarray.Dataset
         The product of the stage's name.
+
+    Raises
+    ------
+    ValueError
+        If it has values that cannot be (`variables.refuse_values`).
     """
     stage = STAGES[name]
     logger.info("stage %s", name)
     part = study.part(study.values(stage.sections))
     inputs = {key: products[key] for key in stage.inputs}
     inputs |= {key: products[key] for key in stage.optional if key in products}
-    if not stage.by_channel:
-        return stage.compute(inputs, part)
-    return join_channels(
-        [
-            stage.compute(split_channel(inputs, number), part)
-            for number in range(channel_count(inputs.values()))
-        ]
-    )
+    if stage.by_channel:
+        product = join_channels(
+            [
+                stage.compute(split_channel(inputs, number), part)
+                for number in range(channel_count(inputs.values()))
+            ]
+        )
+    else:
+        product = stage.compute(inputs, part)
+    variables.refuse_values(product, name, inputs)
+    return product
 
 
 def channel_count(products: Iterable[xr.Dataset]) -> int:
