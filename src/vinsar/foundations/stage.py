@@ -30,7 +30,8 @@ class Stage:
         Parts of the configuration that it reads, and no others: sections, or single keys such as
         ``radar.frequency_count``.
     by_channel
-        Whether each channel is computed from its own part of the inputs alone.
+        Whether each channel comes from its own part of the inputs alone, so that a sweep computes
+        it only where that changes.
     optional
         Products that it reads if the study has them.
     parallel

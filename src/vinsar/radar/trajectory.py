@@ -332,12 +332,8 @@ def displaced(trajectory: xr.Dataset, displacement: NDArray[np.floating]) -> xr.
     displacement
         Displacement (channel, position, axis), m.
     """
-    return trajectory.assign(
-        {
-            name: trajectory[name].copy(data=trajectory[name].values + displacement)
-            for name in ("transmitter", "receiver")
-        }
-    )
+    ends = {name: trajectory[name].values + displacement for name in ("transmitter", "receiver")}
+    return trajectory.copy(data=ends)
 
 
 def range_extent(

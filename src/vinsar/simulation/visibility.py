@@ -56,8 +56,8 @@ variables.declare(
 variables.declare(
     "truth",
     {
-        "height": Variable(GRID, "real", "m", "true height on the DEM's grid"),
-        "reflectivity": Variable(GRID, "real", "1", "reflectivity on the DEM's grid"),
+        "height": Variable(GRID, "real", "m", "true height on the DEM's grid", gaps=True),
+        "reflectivity": Variable(GRID, "real", "1", "reflectivity on the DEM's grid", gaps=True),
         "visible_fraction": Variable(
             ("channel", "y", "x"),
             "real",

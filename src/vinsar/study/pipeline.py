@@ -9,15 +9,14 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-import numpy as np
-import xarray as xr
-
 from vinsar.foundations import variables
 from vinsar.study.composition import STAGES
 from vinsar.study.options import SIMULATION
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    import xarray as xr
 
     from vinsar.foundations.configuration import Study
     from vinsar.foundations.stage import Products, Stage
@@ -77,48 +76,36 @@ def run_stage(name: str, products: Mapping[str, xr.Dataset], study: Study) -> xr
     """
     stage = STAGES[name]
     logger.info("stage %s", name)
-    part = study.part(study.values(stage.sections))
     inputs = {key: products[key] for key in stage.inputs}
     inputs |= {key: products[key] for key in stage.optional if key in products}
-    if stage.by_channel:
-        product = join_channels(
-            [
-                stage.compute(split_channel(inputs, number), part)
-                for number in range(channel_count(inputs.values()))
-            ]
-        )
-    else:
-        product = stage.compute(inputs, part)
+    return compute(name, inputs, study.part(study.values(stage.sections)))
+
+
+def compute(name: str, inputs: Products, part: Study) -> xr.Dataset:
+    """Compute one stage from no more than what it declares, and check what it delivers.
+
+    Parameters
+    ----------
+    name
+        A key of `STAGES`.
+    inputs
+        The products that it reads, by name.
+    part
+        The sections and keys that it reads.
+
+    Returns
+    -------
+    xarray.Dataset
+        The product of the stage's name.
+
+    Raises
+    ------
+    ValueError
+        If it has values that cannot be (`variables.refuse_values`).
+    """
+    product = STAGES[name].compute(inputs, part)
     variables.refuse_values(product, name, inputs)
     return product
-
-
-def channel_count(products: Iterable[xr.Dataset]) -> int:
-    """Return how many channels some products have."""
-    return max(product.sizes.get("channel", 1) for product in products)
-
-
-def split_channel(products: Mapping[str, xr.Dataset], number: int) -> Products:
-    """Return one channel's part of each product."""
-    return {
-        name: product.isel(channel=[number]) if "channel" in product.dims else product
-        for name, product in products.items()
-    }
-
-
-def join_channels(parts: list[xr.Dataset]) -> xr.Dataset:
-    """Return one product from its channels' parts; what has no channel is the first part's."""
-    first = parts[0]
-    joined = {}
-    for name, values in first.variables.items():
-        if "channel" in values.dims:
-            pieces = [part.variables[name].values for part in parts]
-            axis = values.dims.index("channel")
-            joined[name] = (values.dims, np.concatenate(pieces, axis=axis), values.attrs)
-        else:
-            joined[name] = (values.dims, values.values, values.attrs)
-    coords = {name: joined.pop(name) for name in first.coords}
-    return xr.Dataset(joined, coords)
 
 
 def run(

@@ -322,7 +322,7 @@ class _Product:
         if self._whole is None:
             whole = self.parts[0]
             if len(self.parts) > 1:
-                joined = pipeline.join_channels([part for part, _ in self.parts])
+                joined = _join_channels([part for part, _ in self.parts])
                 whole = joined, _digest(*(name for _, name in self.parts))
             self._whole = whole
         return self._whole
@@ -339,7 +339,7 @@ class _Product:
             return self.parts[0]
         if self._channels is None:
             labels = [str(label) for label in data["channel"].values]
-            split = [pipeline.split_channel({"": data}, n)[""] for n in range(len(labels))]
+            split = [_split_channel(data, n) for n in range(len(labels))]
             self._channels = [
                 (part, _identity(part, _digest(name, label)))
                 for part, label in zip(split, labels, strict=True)
@@ -392,7 +392,7 @@ class Memo:
         for name, stage in stages.items():
             setting = {key: values[key] for key in stage.sections}
             text = _text(setting)
-            compute = partial(_compute, stage, setting)
+            compute = partial(_compute, name, setting)
             inputs = {key: made[key] for key in stage.inputs}
             inputs |= {key: made[key] for key in stage.optional if key in made}
             if stage.by_channel:
@@ -446,8 +446,27 @@ def _channels(products: Iterable[_Product]) -> list[str]:
     return next(filter(None, (product.names() for product in products)))
 
 
-def _compute(stage: Stage, setting: dict[str, Any], products: Products) -> xr.Dataset:
-    return stage.compute(products, StudyModel.part(setting))
+def _compute(name: str, setting: dict[str, Any], products: Products) -> xr.Dataset:
+    return pipeline.compute(name, products, StudyModel.part(setting))
+
+
+def _split_channel(product: xr.Dataset, number: int) -> xr.Dataset:
+    return product.isel(channel=[number]) if "channel" in product.dims else product
+
+
+def _join_channels(parts: list[xr.Dataset]) -> xr.Dataset:
+    """Return one product from its channels' parts; what has no channel is the first part's."""
+    first = parts[0]
+    joined = {}
+    for name, values in first.variables.items():
+        if "channel" in values.dims:
+            pieces = [part.variables[name].values for part in parts]
+            axis = values.dims.index("channel")
+            joined[name] = (values.dims, np.concatenate(pieces, axis=axis), values.attrs)
+        else:
+            joined[name] = (values.dims, values.values, values.attrs)
+    coords = {name: joined.pop(name) for name in first.coords}
+    return xr.Dataset(joined, coords)
 
 
 def _identity(product: xr.Dataset, origin: str) -> str:
