@@ -324,16 +324,39 @@ def test_results_do_not_depend_on_the_threads(signal, rail, scatterers):
         assert len(set(by_threads(compute))) == 1
 
 
-def test_smoothed_spectra_are_sums_over_3_x_3_that_wrap_around():
-    rng = np.random.default_rng(8)
-    spectra = rng.normal(size=(2, 3, 7, 5, 2)).astype(np.float32).view(np.complex64)[..., 0]
-    spectra[1, 1] = 0
+@pytest.mark.parametrize("alpha", [0.3, 1.0])
+def test_spectra_are_weighed_by_sums_over_3_x_3_that_wrap_around(alpha):
+    parts = np.random.default_rng(3).normal(size=(2, 7, 3, 6, 2)).astype(np.float32)
+    spectra = parts.view(np.complex64)[..., 0]
+    spectra[1, :, 2] = 0
     weights = np.empty(spectra.shape, np.float32)
-    patches.smooth(spectra, weights)
-    shifts = [(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1)]
-    exact = sum(np.roll(np.abs(spectra), shift, axis=(-2, -1)) for shift in shifts)
-    peak = exact.max(axis=(-2, -1), keepdims=True)
-    np.testing.assert_allclose(weights, exact / np.where(peak > 0, peak, 1), atol=1e-6)
+    patches.weigh(spectra, alpha, weights)
+    for j, i in np.ndindex(2, 3):
+        patch, found = np.abs(spectra[j, :, i]), weights[j, :, i]
+        shifts = [(down, across) for down in (-1, 0, 1) for across in (-1, 0, 1)]
+        sums = sum(np.roll(patch, shift, axis=(0, 1)) for shift in shifts)
+        expected = (sums / sums.max()) ** alpha if patch.any() else np.zeros_like(patch)
+        # Nine roundings of the sum, and those of the power.
+        np.testing.assert_allclose(found, expected, rtol=1.5e-6)
+
+
+@kernel
+def call_power(base, exponent, result):
+    for i in range(base.size):
+        result[i] = functions.power(base[i], exponent)
+
+
+@pytest.mark.parametrize("exponent", [0.01, 0.3, 0.8, 1.0])
+def test_powers_err_less_than_they_say(exponent):
+    base = np.append(np.geomspace(2e-38, 1, 100_000), np.linspace(0.4, 1, 100_000))
+    base, exponent = base.astype(np.float32), np.float32(exponent)
+    found = np.empty_like(base)
+    call_power(base, exponent, found)
+    exact = base.astype(float) ** float(exponent)
+    # That each power of two below 1 adds 3e-7, and the fits and their sums a few roundings.
+    assert (np.abs(found / exact - 1) < 3e-7 * (1 - np.log2(exact))).all()
+    call_power(np.float32([0, 1e-39]), exponent, found[:2])
+    assert (found[:2] == 0).all()
 
 
 @pytest.mark.parametrize("holes", [0.0, 0.3])

@@ -14,6 +14,7 @@ from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
 from vinsar.processing import masks, response
+from vinsar.processing.patches import Patches
 from vinsar.radar import waveform
 
 if TYPE_CHECKING:
@@ -74,8 +75,6 @@ def goldstein(
     ValueError
         If alpha is outside 0..1, or the step does not divide the patch at least twice.
     """
-    from scipy import fft
-
     from vinsar.kernels import patches as kernel
 
     if not 0 <= alpha <= 1:
@@ -84,40 +83,22 @@ def goldstein(
         raise ValueError(
             f"a step of {step_px} pixels must divide the patch of {patch_px} pixels twice or more"
         )
-    rows, columns = interferogram.shape
     known = np.isfinite(interferogram)
-    # Every pixel lies in as many patches as every other.
-    lead = patch_px - step_px
-    down = -(-(rows + lead) // step_px)
-    across = -(-(columns + lead) // step_px)
-    padded = np.zeros(
-        (lead + down * step_px + patch_px, lead + across * step_px + patch_px), np.complex64
-    )
-    padded[lead : lead + rows, lead : lead + columns] = np.where(known, interferogram, 0)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (patch_px, patch_px))
-    patches = windows[: down * step_px : step_px, : across * step_px : step_px]
-    taper = np.sin(np.pi * (np.arange(patch_px) + 0.5) / patch_px).astype(np.float32) ** 2
-    # Batches of rows of patches, each added up by itself: one result however many run at once.
-    batch = max(1, _PIXELS_PER_BATCH // (across * patch_px**2))
+    patches = Patches(known.shape, patch_px, step_px)
+    padded = patches.padded(np.where(known, interferogram, 0))
+    # Batches of columns of patches, each added up by itself: one result however many run at once.
+    batch = max(1, _PIXELS_PER_BATCH // (patches.down * patch_px**2))
 
     def work(begin: int) -> NDArray[np.complex64]:
-        block = patches[begin : begin + batch]
-        spectra = fft.fft2(block)
+        spectra = patches.spectra(padded, begin, begin + batch)
         weights = np.empty(spectra.shape, np.float32)
-        kernel.smooth(spectra, weights)
-        np.power(weights, np.float32(alpha), out=weights)
+        kernel.weigh(spectra, alpha, weights)
         spectra *= weights
-        band = np.zeros(((len(block) - 1) * step_px + patch_px, padded.shape[1]), np.complex64)
-        kernel.overlap_add(fft.ifft2(spectra, overwrite_x=True), taper, step_px, band)
-        return band
+        return patches.band(spectra)
 
-    total = np.zeros_like(padded)
-    begins = range(0, down, batch)
-    for begin, band in zip(begins, blocks.run(work, ((n,) for n in begins)), strict=True):
-        total[begin * step_px : begin * step_px + len(band)] += band
-    # Tapers squared-sine at a step that divides the patch add up to a constant.
-    gain = (patch_px / (2 * step_px)) ** 2
-    filtered = np.asarray(total[lead : lead + rows, lead : lead + columns] / gain, np.complex64)
+    begins = range(0, patches.across, batch)
+    bands = blocks.run(work, ((begin,) for begin in begins))
+    filtered = np.asarray(patches.image(bands, [*begins]), np.complex64)
     filtered[~known] = np.nan
     return filtered
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from vinsar.processing.patches import Patches
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -141,50 +143,22 @@ class Goldstein:
     follows_amplitude = False
 
     def __init__(self, interferogram: Complexes, *, alpha: float, patch_px: int) -> None:
-        from scipy import fft
-
         from vinsar.kernels import patches as kernel
 
-        self.side = patch_px
-        self.step = next(n for n in range(patch_px // 4, 0, -1) if patch_px % n == 0)
-        self.shape = interferogram.shape
-        lead = self.side - self.step
-        self.lead = lead
-        self.down, self.across = (-(-(size + lead) // self.step) for size in self.shape)
-        spectra = fft.fft2(self._patches(interferogram))
+        step = next(n for n in range(patch_px // 4, 0, -1) if patch_px % n == 0)
+        self.patches = Patches(interferogram.shape, patch_px, step)
+        spectra = self._spectra(interferogram)
         self.weights = np.empty(spectra.shape, np.float32)
-        kernel.smooth(spectra, self.weights)
-        np.power(self.weights, np.float32(alpha), out=self.weights)
-        profile = np.sin(np.pi * (np.arange(self.side) + 0.5) / self.side) ** 2
-        self.taper = profile.astype(np.float32)
+        kernel.weigh(spectra, alpha, self.weights)
 
-    def _patches(self, values: Complexes) -> Complexes:
-        size = [self.lead + n * self.step + self.side for n in (self.down, self.across)]
-        padded = np.zeros(size, np.complex64)
-        padded[self.lead : self.lead + self.shape[0], self.lead : self.lead + self.shape[1]] = (
-            values
-        )
-        windows = np.lib.stride_tricks.sliding_window_view(padded, (self.side, self.side))
-        return np.asarray(
-            windows[: self.down * self.step : self.step, : self.across * self.step : self.step]
-        )
-
-    def _add_up(self, patches: Complexes) -> Complexes:
-        from vinsar.kernels import patches as kernel
-
-        size = [self.lead + n * self.step + self.side for n in (self.down, self.across)]
-        total = np.zeros(size, np.complex64)
-        kernel.overlap_add(
-            np.ascontiguousarray(patches, np.complex64), self.taper, self.step, total
-        )
-        inside = total[self.lead : self.lead + self.shape[0], self.lead : self.lead + self.shape[1]]
-        return np.asarray(inside / (self.side / (2 * self.step)) ** 2)
+    def _spectra(self, values: Complexes) -> Complexes:
+        return self.patches.spectra(self.patches.padded(values), 0, self.patches.across)
 
     def apply(self, values: Complexes) -> Complexes:
         """Return values (y, x) filtered with these weights."""
-        from scipy import fft
-
-        return self._add_up(fft.ifft2(fft.fft2(self._patches(values)) * self.weights))
+        spectra = self._spectra(values)
+        spectra *= self.weights
+        return self.patches.image([self.patches.band(spectra)], [0])
 
     def gain(
         self, noise: Decorrelation, shape: tuple[int, int], spacing: tuple[float, float]
@@ -193,24 +167,29 @@ class Goldstein:
 
         The sum over the patch's frequencies of its squared weights times the noise's spectrum.
         """
-        centers = [
-            np.clip(np.arange(n) * self.step + self.side // 2 - self.lead, 0, size - 1)
-            for n, size in zip((self.down, self.across), shape, strict=True)
-        ]
-        part = noise.at(np.ix_(*centers))
-        lag = np.fft.fftfreq(self.side) * self.side
-        overlap = 1 - np.abs(lag) / self.side
+        patches = self.patches
+        part = noise.at(np.ix_(*patches.centers()))
+        lag = np.fft.fftfreq(patches.side) * patches.side
+        overlap = 1 - np.abs(lag) / patches.side
         own, cross = (
-            [np.fft.fft(values * overlap, axis=1).real / self.side for values in pair]
+            [
+                np.fft.fft(values * overlap, axis=1).real.reshape(
+                    patches.down, patches.across, patches.side
+                )
+                / patches.side
+                for values in pair
+            ]
             for pair in zip(
                 *(part.correlations(axis, lag * spacing[axis]) for axis in (1, 0)), strict=True
             )
         )
-        power = self.weights.reshape(-1, self.side, self.side) ** 2
-        sums = [np.einsum("pij,pi,pj->p", power, *pair, optimize=True) for pair in (own, cross)]
-        found = part.combine(*sums).reshape(self.down, self.across, 1, 1)
-        spread = np.broadcast_to(found, (self.down, self.across, self.side, self.side))
-        left = self._add_up(spread.astype(np.complex64)).real.astype(float)
+        power = self.weights**2
+        sums = [
+            np.einsum("jcir,ijr,ijc->ij", power, *pair, optimize=True).ravel()
+            for pair in (own, cross)
+        ]
+        found = part.combine(*sums).reshape(patches.down, patches.across)
+        left = patches.spread(found)
         # At the edges there is less to average: of as many pixels as it averages inside.
         cell = np.median(noise.resolution[0] * noise.resolution[1]) / (spacing[0] * spacing[1])
         reach = max(1, round(float(np.sqrt(cell / np.median(left)))))
