@@ -196,10 +196,16 @@ def split_band(
     parts = []
     for image, part in zip(images, antennas, strict=True):
         # In y a pixel turns by the carrier's path; without that the band lies around 0.
-        carrier = np.exp(-2j * np.pi / wavelength_m * aperture.path(part, x[None, :], y[:, None]))
+        path = aperture.path(part, x[None, :], y[:, None])
+        carrier = _phasor(2 * np.pi / wavelength_m * path)
         parts.append(
             _outer_thirds(image * carrier, spacing[1], resolution[1].mean(axis=0), carrier)
         )
+    thirds = []
+    for lower, upper, share in zip(*parts, shares, strict=True):
+        turned = lower * np.conj(upper) * _phasor(phase * (1 + share))
+        thirds.append((turned, np.abs(lower) ** 2, np.abs(upper) ** 2))
+    turn = 2 * np.pi * float(shares[1] - shares[0])
     result = []
     for looks in SPLIT_LOOKS:
         side = uncertainty.window(looks, resolution, spacing)
@@ -207,19 +213,21 @@ def split_band(
         cells = area / (3 * resolution[0] * resolution[1])
         covered = uniform_filter(np.ones(phase.shape), side, mode="constant")
         sums, variance = [], np.zeros(phase.shape)
-        for lower, upper, share in zip(*parts, shares, strict=True):
-            turned = lower * np.conj(upper) * np.exp(-1j * phase * (1 + share))
-            total, *powers = (
-                _total(values, side) for values in (turned, np.abs(lower) ** 2, np.abs(upper) ** 2)
-            )
+        for third in thirds:
+            total, *powers = (_total(values, side) for values in third)
             coherence = np.abs(total) / np.sqrt(np.maximum(powers[0] * powers[1], _TINY))
             coherence = np.clip(coherence, 0.02, 0.9999)
             variance += (1 - coherence**2) / (2 * coherence**2 * np.maximum(cells * covered, 1))
             sums.append(total)
-        turn = 2 * np.pi * float(shares[1] - shares[0])
         lacking = np.angle(sums[1] * np.conj(sums[0])) / turn
         result.append(Cycles(lacking if rising else -lacking, np.sqrt(variance) / turn))
     return result
+
+
+def _phasor(phase: Floats) -> NDArray[np.complex64]:
+    """Return exp(-i phase) in single precision, which a phase of many cycles needs only after."""
+    left = np.asarray(phase % (2 * np.pi), np.float32)
+    return np.asarray(np.cos(left) - 1j * np.sin(left), np.complex64)
 
 
 def _outer_thirds(
