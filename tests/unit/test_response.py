@@ -107,3 +107,47 @@ def test_the_mean_of_a_rectangle_has_its_cells_as_looks():
 def test_an_unknown_filter_is_refused():
     with pytest.raises(ValueError, match="no filter 'wavelet'"):
         of(np.ones((4, 4)), "wavelet")
+
+
+GROUND = response.Rough(0.25, (0.18, 0.08), (0.05, 0.05), (11, 11))
+
+
+def drawn(rng, ground, count):
+    """Rough ground about its mean over the window, drawn from its spectrum, and its image's."""
+    power, cell = ground.spectra(count)
+    white = np.fft.fft2(rng.standard_normal((count, count)))
+    seen = [np.fft.ifft2(white * np.sqrt(power) * part).real * count for part in (1, cell)]
+    return seen[0], seen[1]
+
+
+def test_rough_ground_is_a_gaussian_less_its_mean_and_a_cell_averages_as_its_point_response():
+    count = 128
+    power, cell = GROUND.spectra(count)
+    assert power.sum() == pytest.approx(1)
+    # sinc^2(d / rho) summed over so far that its tail, 1 / pi^2 d, is half a per cent.
+    place = np.arange(-800, 801) * 0.05
+    for axis, rho in ((0, 0.08), (1, 0.18)):
+        response_ = np.sinc(place / rho) ** 2
+        k = np.fft.fftfreq(count, 0.05)[:20]
+        expected = np.cos(2 * np.pi * np.outer(k, place)) @ response_ / response_.sum()
+        np.testing.assert_allclose(np.take(cell, 0, axis=1 - axis)[:20], expected, atol=0.02)
+    # Of a plane nothing is left, of waves far shorter than the window everything.
+    shape = np.exp(-((np.pi * 0.25 * np.fft.fftfreq(count, 0.05)) ** 2))
+    kept = power / np.outer(shape, shape)
+    assert kept[0, 0] == 0
+    assert kept[1, 1] < 0.01 * kept.max()
+
+
+@pytest.mark.parametrize("method", filtering.FILTERS)
+def test_what_is_taken_of_rough_ground_is_what_the_filter_takes_of_a_drawn_one(method):
+    rng = np.random.default_rng(9)
+    count = 192
+    noise = 0.25 * speckle(rng, (count, count))
+    filter_ = of(1 + noise, method, goldstein_patch_px=32)
+    true, image = drawn(rng, GROUND, count)
+    small = 0.02
+    passed = np.angle(filter_.apply((np.exp(1j * small * image)).astype(np.complex64))) / small
+    inner = np.s_[16:-16, 16:-16]
+    found = filter_.taken(GROUND, true.shape)[inner]
+    # 8 m hold a thousand squares of a correlation length: 3 sqrt(2 / 1000) = 13 %.
+    assert found.mean() == pytest.approx(np.mean((true - passed)[inner] ** 2), rel=0.15)

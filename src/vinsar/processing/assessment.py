@@ -27,6 +27,9 @@ logger = logging.getLogger(__name__)
 # Samples of a weighting, enough for its noise bandwidth.
 _WEIGHTS = 401
 
+# Rounding of a noise bandwidth.
+_SLACK = 1e-9
+
 # Antennas closer than this stand in one place.
 _SAME_M = 1e-6
 
@@ -140,7 +143,13 @@ def assess(
     by_noise = uncertainty.noise_variance(noise, filter_, left, passed, spacing=spacing)
     taken = uncertainty.smoothing(filter_, left, resolution=resolution, spacing=spacing)
     wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
-    own = np.minimum(by_noise + uncertainty.mean(taken**2, wide), uncertainty.UNIFORM)
+    terrain = uncertainty.mean(taken**2, wide)
+    if not (widening > 1 + _SLACK).any():
+        # Both tell of the same, the one of relief, the other of rougher ground. Under a weighting
+        # pixels share speckle as far as they share ground.
+        rough = uncertainty.roughness(filter_, left, resolution=resolution, spacing=spacing)
+        terrain = np.maximum(terrain, rough)
+    own = np.minimum(by_noise + terrain, uncertainty.UNIFORM)
     shared = _reference_variance(reference, noise, product, own, x, y)
     shared = shared + motion_variance(motion, instrument, reference, x, y)
     ambiguity = instrument.height_of_ambiguity(across, ahead)

@@ -53,7 +53,7 @@ variables.declare(
             "real",
             "m",
             "standard deviation of the height",
-            "from the data: noise, smoothing by filter and resolution cell, height reference, what "
+            "from the data: noise, what filter and resolution cell take, height reference, what "
             "autofocus leaves",
             bounds=(0, np.inf),
             gaps=True,

@@ -28,6 +28,11 @@ _NODE_PX = 6
 # A Gaussian's weights are cut where they are below 1 %.
 _REACH = 3
 
+# Frequencies along an axis over which rough ground is summed, and the least power that counts.
+_BINS, _LEAST_POWER = 64, 1e-3
+
+_TINY = np.finfo(np.float32).tiny
+
 
 class Response(Protocol):
     """A filter with its weights."""
@@ -65,6 +70,66 @@ class Response(Protocol):
     def neighbours(self, noise: Decorrelation, spacing: tuple[float, float]) -> Floats:
         """Return the correlation of a pixel's noise with that of the next one along y (y, x)."""
         ...
+
+    def taken(self, ground: Rough, shape: tuple[int, int]) -> Floats:
+        """Return the mean square of what cell and filter take from rough ground (y, x).
+
+        With C the cell's transfer, W the filter's and S the ground's spectrum around the local
+        fringe, the sum of ``S (1 - W C)^2``.
+
+        Parameters
+        ----------
+        ground
+            Rough ground of unit variance.
+        shape
+            Shape of the image.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Rough:
+    """Ground of a Gaussian autocorrelation, less its mean over a window; of unit variance.
+
+    Attributes
+    ----------
+    correlation_m
+        Distance at which the correlation has fallen to 1/e, m.
+    cell_m
+        Resolution in x and y, over which an image averages it, m.
+    spacing
+        Spacing of the pixels in x and y, m.
+    window_px
+        Rows and columns of the window whose mean is taken away.
+    """
+
+    correlation_m: float
+    cell_m: tuple[float, float]
+    spacing: tuple[float, float]
+    window_px: tuple[int, int]
+
+    def spectra(self, count: int) -> tuple[Floats, Floats]:
+        """Return its power spectrum, of sum 1, and the resolution cell's transfer.
+
+        Both over so many frequencies along either axis, in the order of an FFT (y, x). A cell of
+        the power ``sinc^2(d / rho)`` has the transfer ``1 - |k| rho``.
+        """
+        power, cell, kept = [], [], []
+        for resolution, spacing, side in zip(
+            self.cell_m, self.spacing, self.window_px[::-1], strict=True
+        ):
+            k = np.fft.fftfreq(count, spacing)
+            power.append(np.exp(-((np.pi * self.correlation_m * k) ** 2)))
+            cell.append(np.maximum(0, 1 - np.abs(k) * resolution))
+            place = np.arange(side) - side // 2
+            kept.append(np.cos(2 * np.pi * np.outer(k * spacing, place)).mean(axis=1))
+        left = np.outer(*power[::-1]) * (1 - np.outer(*kept[::-1])) ** 2
+        return left / left.sum(), np.outer(*cell[::-1])
+
+    def correlation(self, count: int) -> Floats:
+        """Return the covariance of an image's pixels over so many distances, as of an FFT."""
+        power, cell = self.spectra(count)
+        return np.asarray(np.fft.fft2(power * cell**2).real)
 
 
 @dataclass(frozen=True)
@@ -126,6 +191,14 @@ class Average:
         ratio = left[:, 1] / np.maximum(left[:, 0], np.finfo(float).tiny)
         return np.clip(ratio, 0, 1).reshape(noise.coherence.shape)
 
+    def taken(self, ground: Rough, shape: tuple[int, int]) -> Floats:
+        """Return what cell and average take from rough ground, as in `Response`."""
+        power, cell = ground.spectra(_BINS)
+        place = np.arange(self.weights.size) - self.weights.size // 2
+        along = np.cos(2 * np.pi * np.outer(np.fft.fftfreq(_BINS), place)) @ self.weights
+        lost = (power * (1 - np.outer(along, along) * cell) ** 2).sum()
+        return np.full(shape, float(lost))
+
 
 class Goldstein:
     """Goldstein's filter with the weights that it found.
@@ -148,6 +221,10 @@ class Goldstein:
         step = next(n for n in range(patch_px // 4, 0, -1) if patch_px % n == 0)
         self.patches = Patches(interferogram.shape, patch_px, step)
         spectra = self._spectra(interferogram)
+        power = (spectra.real**2 + spectra.imag**2).transpose(0, 2, 1, 3)
+        strongest = power.reshape(*power.shape[:2], -1).argmax(axis=2)
+        # Column and row (patch along x, patch along y) of the strongest line of each spectrum.
+        self.fringe = np.divmod(strongest, patch_px)
         self.weights = np.empty(spectra.shape, np.float32)
         kernel.weigh(spectra, alpha, self.weights)
 
@@ -199,6 +276,28 @@ class Goldstein:
         """Return the correlation of a pixel's noise with its neighbour's, as in `Response`."""
         del spacing
         return np.ones(noise.coherence.shape)
+
+    def taken(self, ground: Rough, shape: tuple[int, int]) -> Floats:
+        """Return what cell and patches take from rough ground, as in `Response`.
+
+        A patch passes a phase as it passes its two sidebands against the fringe, the strongest
+        line of its spectrum.
+        """
+        del shape
+        side = self.patches.side
+        power, cell = ground.spectra(side)
+        rows, columns = np.nonzero(power > _LEAST_POWER * power.max())
+        power, cell = power[rows, columns], cell[rows, columns]
+        each = [place[..., None] for place in np.indices(self.fringe[0].shape)]
+        column, row = (place[..., None] for place in self.fringe)
+
+        def at(sign: int) -> Floats:
+            down, across = (row + sign * rows) % side, (column + sign * columns) % side
+            return np.asarray(self.weights[each[0], across, each[1], down])
+
+        carrier = np.maximum(self.weights[each[0], column, each[1], row], _TINY)
+        passed = np.minimum((at(1) + at(-1)) / (2 * carrier), 1)
+        return self.patches.spread(((1 - passed * cell) ** 2 @ power).T)
 
 
 def gaussian_weights(std_px: float) -> Floats:

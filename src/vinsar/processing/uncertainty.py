@@ -11,6 +11,8 @@ Three things err in a filtered phase.
 * **Smoothing.** Resolution cell and filter average over terrain. What they take away from the
   phase of a few looks tells what they have taken away from the true one. It is an error of fixed
   sign in each place; over the surroundings its mean square counts as variance.
+* **Roughness** that a few looks hide as the filter does. Speckle and noise of pixels further apart
+  than a resolution cell are independent, so what such phases have in common is the ground's.
 * **The height reference**, whose error all heights share.
 """
 
@@ -27,6 +29,7 @@ from vinsar.radar.decorrelation import Decorrelation
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    Flags = NDArray[np.bool_]
     Floats = NDArray[np.floating]
     Complexes = NDArray[np.complexfloating]
     Spacing = tuple[float, float]
@@ -36,6 +39,17 @@ PHASE_LOOKS = 9.0
 
 NOISE_LOOKS = 42.0
 """Looks of the window over which the noise's power is averaged: to a sixth, by its chi-square."""
+
+# Rough ground: looks of the window whose mean phase it departs from, correlation lengths tried and
+# the longest distance at which its pixels are compared, in resolution cells in x, and looks of the
+# window over which they are.
+_TREND_LOOKS, _ROUGH_CELLS, _REACH_LAGS, _ROUGH_LOOKS = 25.0, (1.2, 1.6, 2.2, 3.3), 2.8, 500.0
+
+# What departs by so many standard deviations does not count, nor does a window so dark.
+_STANDS_OUT, _LEAST_WEIGHT = 3.0, 0.1
+
+# Median of the magnitude of a normal distribution, over its standard deviation.
+_MEDIAN_OF_NORMAL = 0.6745
 
 UNIFORM = np.pi**2 / 3
 """Variance of a phase of which nothing is known, rad^2."""
@@ -67,7 +81,9 @@ def window(
     tuple of int
         Rows and columns.
     """
-    side = float(np.sqrt(looks * np.median(resolution[0] * resolution[1])))
+    # Resolution changes slowly: a few of its values tell their median.
+    few = resolution[:, ::4, ::4]
+    side = float(np.sqrt(looks * np.median(few[0] * few[1])))
     stretch = np.sqrt(elongation)
     return _odd(side * stretch / spacing[1]), _odd(side / stretch / spacing[0])
 
@@ -283,6 +299,123 @@ def smoothing(
     start = unit(signal)
     again = filter_.apply(_blur(amplitude * start, *spread).astype(np.complex64))
     return np.asarray(mean(np.angle(again * np.conj(start)), side), float)
+
+
+def roughness(
+    filter_: response.Response, product: Complexes, *, resolution: Floats, spacing: Spacing
+) -> Floats:
+    """Return the variance of what resolution cell and filter take away from rough ground.
+
+    Pixels a resolution cell and more apart in x share no noise, whatever the baseline makes of it
+    along y. To the products of their phases about their mean over some looks a Gaussian
+    autocorrelation is fitted by least squares: its length, out of `_ROUGH_CELLS`, over the whole
+    image, its variance around each pixel. Shorter waves no two cells share. Of the variance cell
+    and filter take their part.
+
+    Parameters
+    ----------
+    filter_
+        The filter.
+    product
+        Interferogram before the filter (y, x).
+    resolution
+        Resolution in x and y (2, y, x), m.
+    spacing
+        Spacing of the pixels in x and y, m.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Variance, rad^2; 0 where there is no roughness to be seen.
+    """
+    trend = window(_TREND_LOOKS, resolution, spacing)
+    cell = float(np.median(resolution[0])), float(np.median(resolution[1]))
+    seen = product != 0
+    if trend == (1, 1) or not seen.any():
+        return np.zeros(product.shape)
+    around = product * np.conj(unit(mean(product, trend)))
+    few = np.angle(mean(around, window(PHASE_LOOKS, resolution, spacing)))
+    # Walls and steep slopes are no roughness.
+    usual = np.abs(few) < _STANDS_OUT * float(np.median(np.abs(few[seen]))) / _MEDIAN_OF_NORMAL
+    left = np.where(usual, product, 0)
+    around = left * np.conj(unit(mean(left, trend)))
+    across, amplitude = around.imag, np.abs(around)
+    reach = [max(1, round(_REACH_LAGS * cell[0] / step)) for step in spacing]
+    lags = _Lags(product.shape, 2 * max(reach))
+    used = (lags.rows <= reach[1]) & (lags.columns <= reach[0])
+    used &= lags.columns * spacing[0] >= cell[0]
+    spectra = lags.spectrum(across), lags.spectrum(amplitude)
+    products, pairs = (lags.autocorrelation(part)[used] for part in spectra)
+    fits = []
+    for cells in _ROUGH_CELLS:
+        ground = response.Rough(cells * cell[0], cell, spacing, trend)
+        expected = ground.correlation(lags.count)[used]
+        size = max(float(pairs @ expected**2), _TINY)
+        fits.append((max(float(products @ expected), 0) ** 2 / size, ground, expected))
+    _, ground, expected = max(fits, key=lambda fit: fit[0])
+    wide = window(_ROUGH_LOOKS, resolution, spacing)
+    found, weight = (
+        mean(part * lags.correlate(spectrum, used, values), wide)
+        for part, spectrum, values in (
+            (across, spectra[0], expected),
+            (amplitude, spectra[1], expected**2),
+        )
+    )
+    weight = np.maximum(weight, max(_LEAST_WEIGHT * float(np.median(weight)), _TINY))
+    # What noise makes of it: the products' correlation over cells of sinc^2 is (2/3)^2 of them.
+    own = mean(across**2, wide) / np.maximum(mean(amplitude, wide), _TINY)
+    cells = max(1.0, 4 / 9 * cell[0] * cell[1] / (spacing[0] * spacing[1]))
+    error = own * cells * np.sqrt(2 / (wide[0] * wide[1] * weight))
+    told = np.maximum(found / weight, _TINY)
+    # Shrunk by it, so that level ground has hardly any.
+    variance = np.maximum(told - error**2 / told, 0)
+    return np.asarray(np.minimum(variance, UNIFORM) * filter_.taken(ground, product.shape))
+
+
+class _Lags:
+    """Distances between the pixels of an image, by FFT.
+
+    Parameters
+    ----------
+    shape
+        Shape of the image.
+    most
+        Largest distance along either axis, pixels.
+    """
+
+    def __init__(self, shape: tuple[int, int], most: int) -> None:
+        from scipy import fft
+
+        self.shape = shape
+        self.count = 2 * most + 1
+        self.padded = tuple(fft.next_fast_len(size + most, real=True) for size in shape)
+        lag = np.rint(np.fft.fftfreq(self.count, 1 / self.count)).astype(int)
+        self.places = np.ix_(lag, lag)
+        self.rows, self.columns = np.abs(self.places[0]), np.abs(self.places[1])
+
+    def spectrum(self, values: Floats) -> Complexes:
+        """Return the spectrum of an image (y, x)."""
+        from scipy import fft
+
+        return np.asarray(fft.rfft2(values, self.padded))
+
+    def autocorrelation(self, spectrum: Complexes) -> Floats:
+        """Return the sums of an image's products by distance (count, count), as of an FFT."""
+        from scipy import fft
+
+        power = spectrum.real**2 + spectrum.imag**2
+        return np.asarray(fft.irfft2(power, self.padded)[self.places])
+
+    def correlate(self, spectrum: Complexes, used: Flags, values: Floats) -> Floats:
+        """Return an image weighted with even values of some of the distances (y, x)."""
+        from scipy import fft
+
+        kernel = np.zeros((self.count, self.count))
+        kernel[used] = values
+        padded = np.zeros(self.padded)
+        padded[self.places] = kernel
+        sums = fft.irfft2(spectrum * fft.rfft2(padded).real, self.padded)
+        return np.asarray(sums[: self.shape[0], : self.shape[1]])
 
 
 def _point_power(resolution_m: float, spacing_m: float) -> Floats:
