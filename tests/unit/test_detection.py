@@ -77,6 +77,10 @@ def test_a_box_or_a_hole_is_found_with_its_place_extent_and_height(detect, rise)
     assert abs(one["detected_height"]) == pytest.approx(abs(rise) + 1.28 * 0.005, abs=0.002)
     assert np.sign(one["detected_height"]) == np.sign(rise)
     expected = np.where(box, detection.OBSTACLE if rise > 0 else detection.HOLE, detection.FREE)
+    if rise > 0:
+        # Half of a window of 0.25 m: a cell on each side.
+        beside = inside(0.8, 12.4, 0.4 + 0.08, 0.6 + 0.08) & ~box
+        expected = np.where(beside, detection.UNKNOWN, expected)
     np.testing.assert_array_equal(found["map_class"], expected)
     np.testing.assert_allclose(found["ground"], slope, atol=1e-3)
 
@@ -100,8 +104,26 @@ def test_what_is_not_valid_is_unknown_whatever_its_height(detect):
     found = detect(height, kind=np.where(lost, SHADOW, VALID))
     kind = found["map_class"].values
     assert found.sizes["detection"] == 0
-    np.testing.assert_array_equal(kind == detection.UNKNOWN, lost)
-    assert (kind[~lost] == detection.FREE).all()
+    # With the rim of a hole, a window of 0.25 m around it.
+    unknown = inside(0, 12, 1.2 + 0.24, 1.6 + 0.24)
+    np.testing.assert_array_equal(kind == detection.UNKNOWN, unknown)
+    assert (kind[~unknown] == detection.FREE).all()
+
+
+def test_the_rim_of_a_hole_is_unknown_and_that_of_a_cast_shadow_is_not(detect):
+    hole, cast = inside(-1, 12, 0.6, 0.6), inside(1, 12.4, 0.4, 0.8)
+    box, folded = inside(1, 11.88, 0.4, 0.2), inside(0, 14, 0.4, 0.4)
+    behind = inside(0, 14.4, 0.4, 0.36)
+    classes = np.select([hole | cast | behind, folded], [SHADOW, UNCERTAIN_CYCLE], VALID)
+    kind = detect(np.where(box, 0.3, 0.0), kind=classes)["map_class"].values
+    assert (kind[inside(-1, 12, 0.6 + 0.24, 0.6 + 0.24)] == detection.UNKNOWN).all()
+    # What an obstacle casts, and what a lost cycle does, have sharp edges.
+    assert (kind[box] == detection.OBSTACLE).all()
+    far = inside(1, 12.6, 0.5, 0.5) & ~cast
+    assert (kind[far] == detection.FREE).all()
+    # One and a half windows around a lost cycle: four cells on each side.
+    assert (kind[inside(0, 14, 0.4 + 0.32, 0.4 + 0.32)] == detection.UNKNOWN).all()
+    assert (kind[inside(0, 14.5, 0.6, 0.16) & ~behind] == detection.FREE).all()
 
 
 def test_without_valid_heights_everything_is_unknown(detect, caplog):

@@ -1,8 +1,9 @@
 """Obstacles and holes: alarms on the reconstructed heights, and on an image alone beside it.
 
 Heights tell what rises above the ground or falls below it, by their standard deviation and class.
-Where they are not valid, or too noisy to tell, the ground is unknown, not free. The 2-D detector is
-what a radar without interferometry has: what is brighter than its surroundings.
+Where they are not valid, too noisy to tell, or share a cell with what is an obstacle or lost, the
+ground is unknown, not free. The 2-D detector is what a radar without interferometry has: what is
+brighter than its surroundings.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
 from vinsar.processing import masks
-from vinsar.processing.classification import VALID
+from vinsar.processing.classification import SHADOW, UNCERTAIN_CYCLE, VALID, grow
 from vinsar.radar import geometry
 
 if TYPE_CHECKING:
@@ -40,6 +41,11 @@ _NODES = 12
 
 # Height that is representative of an area: what a tenth of its cells exceed.
 _PERCENTILE = 90
+
+# So far, in multilook windows, ground beside an obstacle, a hole in the dark or a lost cycle is
+# unknown: foot and wall share a cell, sidelobes fill the rim of a hole, and the windows that tell a
+# cycle are wider than what has lost it.
+_BESIDE_OBSTACLE, _BESIDE_HOLE, _BESIDE_CYCLE = 0.5, 1.0, 1.5
 
 # Residuals below this do not gain weight in the fit of the ground, m.
 _LEAST_RESIDUAL_M = 1e-3
@@ -67,7 +73,7 @@ variables.declare(
             "integer",
             "1",
             "what the ground is taken for",
-            "unknown is what is not valid, or too noisy to tell",
+            "unknown is what is not valid, too noisy to tell, or beside an obstacle or hole",
             flag_meanings="free obstacle hole unknown",
         ),
         "contrast": Variable(
@@ -298,6 +304,13 @@ def detect(dem: xr.Dataset, images: xr.Dataset, *, options: Detection) -> xr.Dat
     below, sunk = regions(significant < -options.threshold_m, least)
     kind = np.full(found.shape, FREE, np.int8)
     kind[~(valid & (noise <= options.threshold_m) & np.isfinite(residual))] = UNKNOWN
+    side = options.multilook_window_m
+    for mask, width in (
+        (above > 0, _BESIDE_OBSTACLE),
+        (_holes(dem["height_class"].values, above > 0, window), _BESIDE_HOLE),
+        (dem["height_class"].values == UNCERTAIN_CYCLE, _BESIDE_CYCLE),
+    ):
+        kind[grow(mask, _window(width * side, x, y))] = UNKNOWN
     kind[above > 0], kind[below > 0] = OBSTACLE, HOLE
     bright, count = regions(contrast > _ratio(options.amplitude_threshold_db), least)
     logger.info("%d obstacles, %d holes; %d alarms of the image alone", raised, sunk, count)
@@ -318,6 +331,26 @@ def detect(dem: xr.Dataset, images: xr.Dataset, *, options: Detection) -> xr.Dat
         | dict(zip(names, table.T, strict=True)),
         {"x": x, "y": y},
     )
+
+
+def _holes(classes: NDArray[np.int8], obstacles: Flags, window_px: tuple[int, int]) -> Flags:
+    """Return shadows that nothing casts: no obstacle and no lost cycle stands before them.
+
+    Each column by itself, as shadows of several things run together.
+    """
+    from scipy.ndimage import label
+
+    dark = classes == SHADOW
+    numbers, _ = label(dark, [[0, 1, 0]] * 3)
+    rows, columns = window_px
+    # A window's rows behind each, not around it.
+    behind = np.zeros_like(dark)
+    standing = grow(obstacles | (classes == UNCERTAIN_CYCLE), (1, columns))
+    for row in range(min(rows, len(dark))):
+        behind[row:] |= standing[: len(dark) - row]
+    alone = dark & ~np.isin(numbers, numbers[behind & dark])
+    # Less than a window of it is the edge of what something casts.
+    return grow(~grow(~alone, window_px), window_px)
 
 
 def _describe(area: Flags, residual: Floats, x: Floats, y: Floats) -> tuple[float, ...]:
