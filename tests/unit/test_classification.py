@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import gamma
 
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.processing import classification
@@ -38,6 +39,13 @@ def test_a_shadow_is_found_and_lit_speckle_is_not():
     # Fifteen looks are 6 dB below their mean once in 1e5; their windows count fifteenfold.
     assert found[far].mean() < 0.005
     assert found[~far].mean() < 0.6
+
+
+@pytest.mark.parametrize("window", classification._SHADOW)
+def test_speckle_is_as_dark_as_a_shadow_once_in_20_000_windows(window):
+    looks, _, level = window
+    # The mean power of L looks of speckle is gamma-distributed (Goodman 1976).
+    assert gamma.cdf(looks * 10 ** (level / 10), looks) < 5e-5
 
 
 def test_a_line_of_sight_passes_over_what_is_known():

@@ -34,11 +34,10 @@ CLASSES = ("valid", "shadow", "layover", "uncertain_cycle", "incoherent", "outsi
 
 VALID, SHADOW, LAYOVER, UNCERTAIN_CYCLE, INCOHERENT, OUTSIDE = range(len(CLASSES))
 
-# Coherent power of a shadow against its surroundings, in two windows of so many looks: a square,
-# and one as wide as the narrowest shadow that is told. Speckle alone does so once in 1e5.
-_SHADOW = 10 ** (-6 / 10)
-_SHADOW_LOOKS = 15.0
-_ELONGATION = 3
+# Windows of so many looks, so many times longer in y than in x, and the coherent power of a shadow
+# in them against its surroundings, dB: a square, one as wide as the narrowest shadow that is told,
+# and one for a pit of eight cells by three. Speckle alone does so once in 1e5, at most in 5e4.
+_SHADOW = ((15.0, 1, -6.0), (15.0, 3, -6.0), (10.0, 1, -7.5))
 
 # A shadow ends where the power of a small window is nearly that of lit ground.
 _EDGE = 10 ** (-1.5 / 10)
@@ -72,8 +71,8 @@ _TINY = float(np.finfo(float).tiny)
 def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, float]) -> Flags:
     """Return which pixels are dark against their surroundings.
 
-    Windows whose coherent power is 6 dB down, without the lit pixels at their edges. The coherent
-    power is that of the interferogram's mean, to which thermal noise adds little.
+    Windows whose coherent power is 6 dB and more down, without the lit pixels at their edges. The
+    coherent power is that of the interferogram's mean, to which thermal noise adds little.
 
     Parameters
     ----------
@@ -92,8 +91,8 @@ def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, floa
     from scipy.ndimage import binary_propagation
 
     shapes = [
-        uncertainty.window(_SHADOW_LOOKS, resolution, spacing, elongation=longer)
-        for longer in (1, _ELONGATION)
+        uncertainty.window(looks, resolution, spacing, elongation=longer)
+        for looks, longer, _ in _SHADOW
     ]
     powers = [np.abs(uncertainty.mean(product, shape)) for shape in shapes]
     usual = np.maximum(
@@ -101,8 +100,8 @@ def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, floa
         max(_LEAST_BACKGROUND * float(np.median(powers[0])), _TINY),
     )
     dark = np.zeros(product.shape, bool)
-    for power, shape in zip(powers, shapes, strict=True):
-        dark |= grow(power < _SHADOW * usual, shape)
+    for power, shape, (*_, level) in zip(powers, shapes, _SHADOW, strict=True):
+        dark |= grow(power < 10 ** (level / 10) * usual, shape)
     edge = uncertainty.window(_EDGE_LOOKS, resolution, spacing)
     lit = np.abs(uncertainty.mean(product, edge)) > _EDGE * usual
     return np.asarray(~binary_propagation(~dark, mask=~dark | lit))
