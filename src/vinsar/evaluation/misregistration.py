@@ -270,7 +270,7 @@ def _difference(
 
 
 def _registration(products: Products, study: Study) -> xr.Dataset:
-    antennas = products["trajectory"]
+    antennas = products["trajectory"].isel(channel=[0, -1])
     frequency = waveform.sampled(study.radar)
     options = study.registration
 

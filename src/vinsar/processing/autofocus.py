@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -665,7 +666,7 @@ class _Image:
         from vinsar.kernels import contributions
 
         parts, image, energy = self.form(displacement)
-        reference = image + self.other_channel(image)
+        reference = image + self.other_channels(image)
         result: Complexes = np.empty((*parts.shape[:2], len(self.middles)), complex)
         for channel in range(len(parts)):
             contributions.agree(parts[channel], reference[channel], self.begins, result[channel])
@@ -673,23 +674,30 @@ class _Image:
         result /= np.abs(result).mean() or 1.0
         return result, energy
 
-    def other_channel(self, image: Complexes) -> Complexes:
-        """Return the other channel's image, turned by the phase of the topography between them."""
+    def other_channels(self, image: Complexes) -> Complexes:
+        """Return the others' images (channel, point) for each channel.
+
+        Each is turned by the phase of the topography between the two.
+        """
         from scipy.ndimage import uniform_filter
 
         grid = np.empty_like(image)
         grid[:, self.order] = image
-        grid = grid.reshape(2, *self.shape)
+        grid = grid.reshape(-1, *self.shape)
 
         def smooth(values: Floats) -> Floats:
             return np.asarray(uniform_filter(values, _WINDOW, mode="nearest"))
 
-        product = grid[0] * grid[1].conj()
         power = [smooth(np.abs(part) ** 2) for part in grid]
-        cross = smooth(product.real) + 1j * smooth(product.imag)
-        cross /= np.sqrt(power[0] * power[1]) + np.finfo(np.float32).tiny
-        turned = cross.ravel()[self.order]
-        return np.stack([turned * image[1], turned.conj() * image[0]])
+        result = np.zeros_like(image)
+        for first, second in combinations(range(len(grid)), 2):
+            product = grid[first] * grid[second].conj()
+            cross = smooth(product.real) + 1j * smooth(product.imag)
+            cross /= np.sqrt(power[first] * power[second]) + np.finfo(np.float32).tiny
+            turned = cross.ravel()[self.order]
+            result[first] += turned * image[second]
+            result[second] += turned.conj() * image[first]
+        return result
 
     def energy_of(self, displacement: Floats) -> float:
         """Return the energy of the image relative to that of incoherent positions."""
@@ -704,7 +712,8 @@ class _Image:
         wave = 4 * np.pi / samples.wavelength
         # Amplitude and noise by sector: what is not in focus has little of the first.
         amplitude = np.maximum(found.real.mean(axis=1), 0)
-        weight = amplitude / (found.imag**2).mean(axis=1)
+        # Channels see the same speckle: more than two of them tell no more of what they share.
+        weight = amplitude / (found.imag**2).mean(axis=1) * min(1, 2 / channels)
         slope = -wave * np.einsum("cs,clsi,cls->lci", weight, gradient, found.imag)
         curvature = wave**2 * np.einsum(
             "cs,clsi,clsj->clij", weight * amplitude, gradient, gradient
@@ -733,7 +742,7 @@ class _Image:
         positions = self.samples.positions
         wavelength = self.samples.wavelength
         result = np.empty_like(prior)
-        for mode, signs in enumerate(_MODES):
+        for mode, signs in enumerate(_modes(len(prior))):
             value = np.einsum("c,cli->li", signs, moved)
             spread = np.einsum("c,lcidi,d->li", signs, inverse, signs)
             known = positions - spread.sum(axis=0) / prior[mode] ** 2
@@ -742,7 +751,7 @@ class _Image:
 
     def refine(self, displacement: Floats) -> _State:
         """Take steps until the energy gains no more; the energy is that of the result."""
-        prior = np.full((2, 3), _FIRST_STD * self.samples.wavelength)
+        prior = np.full((self.samples.channels, 3), _FIRST_STD * self.samples.wavelength)
         state = _State(displacement, np.empty(0), prior, 0.0)
         best = 0.0
         for _ in range(_MOST_STEPS):
@@ -755,15 +764,22 @@ class _Image:
         )
 
 
-# What is common to the channels, and their difference.
-_MODES = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
+def _modes(channels: int) -> Floats:
+    """Return what is common to the channels, and what differs between them: orthonormal rows."""
+    found = np.zeros((channels, channels))
+    found[0] = 1
+    for mode in range(1, channels):
+        found[mode, :mode], found[mode, mode] = 1, -mode
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def _precision(prior: Floats) -> Floats:
     """Return the inverse covariance (channel, axis, channel, axis) of the prior (mode, axis)."""
-    result = np.zeros((2, 3, 2, 3))
+    channels = len(prior)
+    modes = _modes(channels)
+    result = np.zeros((channels, 3, channels, 3))
     for axis in range(3):
-        result[:, axis, :, axis] = (_MODES.T / prior[:, axis] ** 2) @ _MODES
+        result[:, axis, :, axis] = (modes.T / prior[:, axis] ** 2) @ modes
     return result
 
 
