@@ -9,7 +9,7 @@ import pytest
 
 import vinsar
 from vinsar.evaluation import misregistration
-from vinsar.processing import focusing
+from vinsar.processing import focusing, speed
 from vinsar.radar import aperture, motion, trajectory, waveform
 from vinsar.simulation import echo
 
@@ -150,3 +150,64 @@ def test_a_switched_array_on_a_moving_vehicle_inverts_the_height(image, system, 
     place = aperture.locate(lower, upper, x, y, wrapped + flat + 2 * np.pi * cycles, WAVELENGTH)
     # A hundredth of a cycle of phase, of 0.93 m a cycle.
     np.testing.assert_allclose(np.array(place), target, atol=1e-2)
+
+
+GROUND = (-2.0, 2.0, 10.0, 13.5)
+
+
+def bound(antennas, incoherent=0.05):
+    return motion.speed_bound(
+        antennas, extent=GROUND, wavelength_m=WAVELENGTH, range_cell_m=0.075,
+        incoherent=incoherent, duration_s=0.5,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("snr_db", [None, 10.0])
+@pytest.mark.parametrize(("error", "seed"), [(0.06, 1), (-0.08, 2)])
+def test_echoes_tell_the_speed(moving, scatterers, error, seed, snr_db):
+    rng = np.random.default_rng(seed)
+    places = np.zeros((15_000, 3))
+    places[:, 0] = rng.uniform(*GROUND[:2], len(places))
+    places[:, 1] = rng.uniform(*GROUND[2:], len(places))
+    true = moving(4.0, "rail")
+    received = echo.simulate(scatterers(places), true, frequency=FREQUENCY, accuracy_db=-60.0)
+    if snr_db is not None:
+        received = echo.add_noise(received, snr_db=snr_db, swath_m=3.5, rngs=[rng, rng])
+    found = speed.estimate(
+        received, moving(4.0 + error, "rail"), extent=GROUND, duration_s=0.5,
+        sensor_std_m_per_s=0.05,
+    )  # fmt: skip
+    assert not found.reason
+    # Three standard deviations of an estimate that errs 2.5 times as much as the bound says.
+    left = error + found.correction
+    assert abs(left) < 7.5 * bound(true, 0.05 if snr_db is None else 1 / 11) < abs(error)
+    assert abs(left) < 4 * found.std
+
+
+def test_the_bound_is_that_of_the_quadratic_phase(moving, rail):
+    """At a small yaw angle: one parameter of the phases of normal speckle, J = 2 N (R o R^-T - 1).
+
+    Sum over ranges of q^T J q, by the phase q = 2 pi (k + dk)^2 s^2 / (lambda r) for a slope dk.
+    """
+    speed_m_per_s, incoherent = 0.4, 0.05
+    k = float(motion.slope(speed_m_per_s, aperture_length_m=0.8, duration_s=0.5))
+    s = np.linspace(-0.4, 0.4, 81)
+    total, ranges = 0.0, np.hypot(np.linspace(10.0, 13.5, 30), 2.15)
+    for r in ranges:
+        ground = np.sqrt(r**2 - 2.15**2)
+        x = np.linspace(-2, 2, 300)
+        cosine = (x + k * np.sqrt(ground**2 - x**2)) / r
+        steering = np.exp(4j * np.pi / WAVELENGTH * np.outer(s, cosine))
+        cov = (1 - incoherent) * steering @ steering.conj().T / x.size + incoherent * np.eye(81)
+        information = 2 * ((cov * np.linalg.inv(cov).T).real - np.eye(81))
+        q = 4 * np.pi * k * s**2 / (WAVELENGTH * r)
+        total += q @ information @ q / ranges.size
+    cells = 2 * (ranges[-1] - ranges[0]) / 0.075
+    expected = 0.8 / 0.5 / np.sqrt(total * cells)
+    # Far ground is ahead, not around; the exact path has higher orders: a few per cent.
+    assert bound(moving(speed_m_per_s, "rail"), incoherent) == pytest.approx(expected, rel=0.05)
+    # The phase grows with the square of the slope: twice the speed tells a small error twice as
+    # well, and a vehicle that stands tells nothing.
+    faster = bound(moving(2 * speed_m_per_s, "rail"), incoherent)
+    assert faster == pytest.approx(expected / 2, rel=0.05)
+    assert bound(rail) > 1e6

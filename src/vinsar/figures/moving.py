@@ -8,7 +8,7 @@ import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
-from vinsar.radar import motion
+from vinsar.radar import motion, trajectory
 from vinsar.simulation import scene
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def draw(products: Products, study: Study) -> Figure:
     Parameters
     ----------
     products
-        ``sweeps/speed``, ``sweeps/speed_error``, ``terrain`` and ``truth``.
+        ``sweeps/speed``, ``sweeps/speed_error``, ``sweeps/echoes``, ``terrain`` and ``truth``.
     study
         The configuration.
 
@@ -89,6 +89,7 @@ def draw(products: Products, study: Study) -> Figure:
             lower.set_ylabel("height error, std (cm)")
     axes = style.place(figure, _LEFTS[3], _BOTTOM, _WIDTHS[3], _TALL)
     keys = _sensor(axes, error, products, study)
+    keys += _echoes(axes, variables.swept(products["sweeps/echoes"], _ERROR).sortby(_ERROR), study)
     _level(axes, relief)
     sweeps.log_y(axes, limits)
     sweeps.legend(figure, [*handles, *_keys()], _LEFTS[0], 2.0, 3)
@@ -279,6 +280,16 @@ def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: Study) -> 
     return keys
 
 
+def _echoes(axes: Axes, error: xr.Dataset, study: Study) -> list[Any]:
+    """Draw the spread once the echoes have corrected the sensor's speed; return its key."""
+    duration = trajectory.scan_duration(study.radar, study.vehicle)
+    look = sweeps.Look(f"{_time(duration)}, corrected by echoes", style.ORANGE, "-", "s")
+    levels = error[_ERROR].values
+    sweeps.curve(axes, levels, error["std"].sel(region=_REGION), look, scale=100)
+    return [handle for handle in axes.get_legend_handles_labels()[0]
+            if handle.get_label() == look.label]  # fmt: skip
+
+
 def _speed(value: float) -> str:
     if not np.isfinite(value):
         return "none seen"
@@ -297,11 +308,13 @@ FIGURES = {
             "speed, and with that of an erroneous sensor. Dotted: amplitude of the target at the "
             "place where it is imaged. (d) Height error against the sensor's error, with the "
             "prediction from the heights of the places that the image shows instead; dotted "
-            "lines mark where it exceeds the error-free one by a tenth. Lines are means and "
+            "lines mark where it exceeds the error-free one by a tenth. Orange: the slow scan once "
+            "its echoes have corrected the sensor's speed. Those of the fast scan tell less than "
+            "the sensor. Lines are means and "
             "bands 10 to 90 % of the realizations."
         ),
         sections=("figures", "radar", "imaging", "vehicle"),
         inputs=("terrain", "truth"),
-        sweeps=("speed", "speed_error"),
+        sweeps=("speed", "speed_error", "echoes"),
     ),
 }

@@ -19,7 +19,7 @@ import numpy as np
 from vinsar.foundations import tables
 from vinsar.foundations.constants import AXES
 from vinsar.processing import filtering
-from vinsar.radar import aperture, grid, instrument, speckle, trajectory
+from vinsar.radar import aperture, grid, instrument, motion, speckle, trajectory
 from vinsar.radar.instrument import Instrument
 from vinsar.study import validation, work
 
@@ -75,6 +75,9 @@ _PARTS = 5
 # Targets over the scene's width for the mean of their phases, and Newton's steps to their range.
 _TARGETS, _STEPS = 41, 4
 _BYTES_PER_SAMPLE = 8
+
+# Share of the power that is not coherent even without noise, as in docs/autofocus.md.
+_INCOHERENT = 0.05
 
 
 def _middles(low: float, high: float) -> Floats:
@@ -700,6 +703,28 @@ class Sheet:
         turn = np.pi * (ends - self.study.echo.coupling_path_m / 2) / period
         return level - 20 * math.log10(count * float(np.abs(np.sin(turn)).min()))
 
+    def speed_bound(self) -> float:
+        """Return the least standard deviation of the speed that one scan's echoes tell, m/s.
+
+        `motion.speed_bound`, with the noise of the scene's middle, or a twentieth of the power if
+        that is more: what relief and sidelobes of range make incoherent.
+        """
+        part, scene = self.study.imaging, self.scene
+        noise = 10 ** (-float(self.snr_db(self.places[1])) / 10)
+        antennas = motion.advance(
+            self.antennas,
+            speed_m_per_s=self.study.vehicle.forward_speed_m_per_s,
+            duration_s=self.scan_duration,
+        )
+        return motion.speed_bound(
+            antennas,
+            extent=(scene.x_min_m, scene.x_max_m, part.y_min_m, part.y_max_m),
+            wavelength_m=self.instrument.wavelength,
+            range_cell_m=self.instrument.range_resolution,
+            incoherent=max(_INCOHERENT, noise / (1 + noise)),
+            duration_s=self.scan_duration,
+        )
+
     def warnings(self) -> list[str]:
         """Return what is questionable, a sentence each, in the order of the chain.
 
@@ -849,6 +874,14 @@ def as_markdown(sheet: Sheet) -> str:
         f"- {sheet.samples} complex samples a scan of {sheet.scan_duration:.3g} s, "
         f"{megabytes:.2f} MB in single precision; the vehicle drives "
         f"{study.vehicle.forward_speed_m_per_s * sheet.scan_duration:.2f} m in it",
+        *(
+            [
+                f"- the echoes of one scan tell the vehicle's speed to {sheet.speed_bound():.2g} "
+                "m/s at best (vehicle.speed_correction: echoes)"
+            ]
+            if study.vehicle.forward_speed_m_per_s > 0
+            else []
+        ),
         f"- work: {work.sentence(study)}",
         "",
         f"At x = {sheet.x:g} m, for relief and obstacles of {sheet.relief:g} m:",

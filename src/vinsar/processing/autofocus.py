@@ -33,7 +33,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing import focusing, leakage
+from vinsar.processing import focusing, leakage, speed
 from vinsar.radar import grid, trajectory, waveform
 
 if TYPE_CHECKING:
@@ -785,18 +785,22 @@ def _precision(prior: Floats) -> Floats:
 
 def _autofocus(products: Products, study: Study) -> xr.Dataset:
     recorded = products["recorded_trajectory"]
+    x, y = grid.image_axes(study.imaging)
+    extent = x[0], x[-1], y[0], y[-1]
+    way = np.zeros(recorded["receiver"].shape)
+    if study.vehicle.speed_correction == "echoes":
+        way += _way(products, study, extent)
     if study.autofocus.method == "none":
-        nothing = np.zeros(recorded["receiver"].shape)
+        nothing = np.zeros_like(way)
         still = nothing[..., 0].copy()
         found = Motion(nothing, nothing, still, still, (np.nan, np.nan))
     else:
-        x, y = grid.image_axes(study.imaging)
         echo = leakage.clean(products["received"], study)
-        found = estimate(echo, recorded, extent=(x[0], x[-1], y[0], y[-1]))
+        found = estimate(echo, trajectory.displaced(recorded, way), extent=extent)
     return variables.dataset(
         "autofocus",
         {
-            "displacement": found.displacement,
+            "displacement": found.displacement + way,
             "displacement_std": found.displacement_std,
             "range_correction": found.range_correction,
             "range_std": found.range_std,
@@ -807,10 +811,32 @@ def _autofocus(products: Products, study: Study) -> xr.Dataset:
     )
 
 
+def _way(products: Products, study: Study, extent: Extent) -> Floats:
+    """Return the displacement (position, axis), m, by what the echoes tell of the speed."""
+    duration = trajectory.scan_duration(study.radar, study.vehicle)
+    told = speed.estimate(
+        leakage.clean(products["received"], study),
+        products["recorded_trajectory"],
+        extent=extent,
+        duration_s=duration,
+        sensor_std_m_per_s=study.vehicle.speed_error_m_per_s,
+    )
+    positions = products["recorded_trajectory"].sizes["position"]
+    return speed.way(told.correction, positions=positions, duration_s=duration)
+
+
 STAGES = {
     "autofocus": Stage(
         _autofocus,
         inputs=("received", "recorded_trajectory"),
-        sections=(*grid.KEYS, "suppression", "autofocus"),
+        sections=(
+            *grid.KEYS,
+            "suppression",
+            "autofocus",
+            "vehicle.speed_correction",
+            "vehicle.speed_error_m_per_s",
+            "vehicle.scan_duration_s",
+            *trajectory.SCAN_KEYS,
+        ),
     ),
 }

@@ -35,6 +35,10 @@ Distribution = Literal["uniform", "normal"]
 Spectrum = Literal["white", "sinusoidal", "random_walk"]
 
 
+# Points across the scene, and ranges, that the bound of the speed takes.
+_BOUND_POINTS, _BOUND_RANGES = 401, 8
+
+
 variables.declare("true_trajectory", ANTENNAS)
 variables.declare("recorded_trajectory", ANTENNAS)
 
@@ -78,8 +82,9 @@ class Vehicle(Section, name="vehicle"):
         gt=0,
         le=60,
     )
-    speed_correction: Literal["none", "exact", "sensor"] = key(
-        "the speed that focusing assumes: zero, the true one, or that of the speed sensor",
+    speed_correction: Literal["none", "exact", "sensor", "echoes"] = key(
+        "the speed that focusing assumes: zero, the true one, that of the speed sensor, or the "
+        "sensor's as the echoes correct it",
         "section 1",
     )
     speed_error_m_per_s: float = key(
@@ -246,6 +251,80 @@ def imaged_place(
     return distance * np.cos(azimuth), distance * np.sin(azimuth)
 
 
+def speed_bound(
+    antennas: xr.Dataset,
+    *,
+    extent: tuple[float, float, float, float],
+    wavelength_m: float,
+    range_cell_m: float,
+    incoherent: float,
+    duration_s: float,
+) -> float:
+    """Return the Cramer-Rao bound of the speed that the echoes of one scan tell, m/s.
+
+    Speckle of level ground that fills an extent, of one power, has at each slant range the
+    covariance R of the positions; the Fisher information of two parameters of it is
+    ``tr(R^-1 dR_a R^-1 dR_b)`` for each range cell and channel (docs/autofocus.md). Nobody knows
+    where the scene lies: what moves a point along the axis of the aperture tells nothing.
+
+    Parameters
+    ----------
+    antennas
+        Product ``trajectory`` with the vehicle's motion.
+    extent
+        Ground that scatters (x_min, x_max, y_min, y_max), m, ahead of the antennas.
+    wavelength_m, range_cell_m
+        Wavelength and resolution in slant range, m.
+    incoherent
+        Share of the power that is noise, of each position's own.
+    duration_s
+        Duration of the scan, s.
+
+    Returns
+    -------
+    float
+        Standard deviation, m/s; infinite where the echoes tell nothing.
+    """
+    ends = [antennas[name].values[0] for name in ("transmitter", "receiver")]
+    center = (ends[0] + ends[1]).mean(axis=0) / 2
+    count = len(ends[0])
+    axis = (ends[0] + ends[1])[-1] - (ends[0] + ends[1])[0]
+    axis = axis / np.linalg.norm(axis)
+    time = duration_s * np.linspace(-0.5, 0.5, count)[:, None]
+    near, far = np.array(extent[2:]) - center[1]
+    across = np.linspace(extent[0], extent[1], _BOUND_POINTS) - center[0]
+    ground = np.linspace(max(near, 1.01 * np.abs(across).max()), far, _BOUND_RANGES)
+    wave = 2 * np.pi / wavelength_m
+    information = np.zeros((2, 2))
+    for distance in ground:
+        ahead = np.sqrt(distance**2 - across**2)
+        points = np.stack([across, ahead, np.full_like(ahead, -center[2])], axis=1)
+        path, by_speed, along = (np.zeros((count, across.size)) for _ in range(3))
+        for end in ends:
+            place = end - center
+            ray = points - place[:, None]
+            length = np.linalg.norm(ray, axis=-1)
+            path += length
+            by_speed -= time * ray[..., 1] / length
+            along -= (place @ axis)[:, None] / length
+        by_speed -= by_speed.mean(axis=0)
+        along -= along.mean(axis=0)
+        by_speed -= along * (along * by_speed).sum(axis=0) / (along**2).sum(axis=0)
+        weight = (1 - incoherent) / across.size
+        steering = np.exp(-1j * wave * (path - path[:, across.size // 2, None]))
+        covariance = weight * steering @ steering.conj().T + incoherent * np.eye(count)
+        slopes = []
+        for by in (by_speed, along):
+            slope = weight * (-1j * wave * by * steering) @ steering.conj().T
+            slopes.append(np.linalg.solve(covariance, slope + slope.conj().T))
+        information += np.array([[np.sum(a * b.T).real for b in slopes] for a in slopes])
+    swath = np.hypot(far, center[2]) - np.hypot(near, center[2])
+    information *= antennas.sizes["channel"] * swath / range_cell_m / ground.size
+    (speed, both), (_, turn) = information
+    left = speed - both**2 / turn
+    return float(1 / np.sqrt(left)) if left > 0 else float("inf")
+
+
 def _half_path(antennas: xr.Dataset, point: Floats) -> Floats:
     legs = [
         np.linalg.norm(antennas[name].values - point, axis=-1)
@@ -394,7 +473,7 @@ def _true_trajectory(products: Products, study: Study) -> xr.Dataset:
 
 
 def told_speed(study: Study) -> float:
-    """Return the speed that focusing assumes, m/s."""
+    """Return the speed that the recorded positions have, m/s: the sensor's for ``echoes``."""
     options = study.vehicle
     if options.speed_correction == "none":
         return 0.0

@@ -202,7 +202,7 @@ def _heights_below_antennas(
 
 
 def _told_short(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) -> Iterator[Fault]:
-    if vehicle.speed_correction != "sensor":
+    if vehicle.speed_correction not in ("sensor", "echoes"):
         return
     # Beyond four standard deviations lies one draw in 30,000.
     told = vehicle.forward_speed_m_per_s + 4 * vehicle.speed_error_m_per_s
