@@ -162,11 +162,10 @@ def bound(antennas, incoherent=0.05):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("snr_db", [None, 10.0])
-@pytest.mark.parametrize(("error", "seed"), [(0.06, 1), (-0.08, 2)])
+@pytest.mark.parametrize(("error", "seed", "snr_db"), [(0.06, 1, None), (-0.08, 2, 10.0)])
 def test_echoes_tell_the_speed(moving, scatterers, error, seed, snr_db):
     rng = np.random.default_rng(seed)
-    places = np.zeros((15_000, 3))
+    places = np.zeros((8_000, 3))
     places[:, 0] = rng.uniform(*GROUND[:2], len(places))
     places[:, 1] = rng.uniform(*GROUND[2:], len(places))
     true = moving(4.0, "rail")
@@ -181,7 +180,7 @@ def test_echoes_tell_the_speed(moving, scatterers, error, seed, snr_db):
     # Three standard deviations of an estimate that errs 2.5 times as much as the bound says.
     left = error + found.correction
     assert abs(left) < 7.5 * bound(true, 0.05 if snr_db is None else 1 / 11) < abs(error)
-    assert abs(left) < 4 * found.std
+    assert abs(left) < 5 * found.std < 0.25
 
 
 def test_the_bound_is_that_of_the_quadratic_phase(moving, rail):

@@ -53,6 +53,10 @@ _REACH, _STEP, _MOST = 4.0, 0.6, 121
 _MOVES, _NEAR = 6, 4
 _ROUNDS, _FIT = 2, 5
 
+# Least standard deviation in units of that of a likelihood as curved as the cost, which counts each
+# taper, and the directions between cells, as looks of their own: as scans of speckle scatter.
+_LEAST_STD = 2.0
+
 # Newton's steps to the turn of the image, and the step of its derivative.
 _TURNS, _SMALL = 4, 1e-4
 
@@ -374,6 +378,8 @@ class _Image:
         # Power is averaged across their borders.
         square += max(0.0, float((blocks[1:] * blocks[:-1]).sum()))
         std = np.sqrt(square * blocks.size / max(blocks.size - 1, 1)) / curvature
+        # Few blocks scatter little by chance.
+        std = max(std, _LEAST_STD / np.sqrt(curvature))
         return float(least + lean / (2 * bend)), float(std)
 
 
