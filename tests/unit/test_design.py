@@ -107,6 +107,22 @@ def test_an_array_dwells_on_each_sample():
     assert sheet_of().scan_duration == PAPER.vehicle.scan_duration_s
 
 
+def test_a_driving_vehicle_s_sheet_says_what_echoes_tell_of_its_speed():
+    def told(**vehicle):
+        return sheet_of(vehicle={"speed_correction": "exact"} | vehicle).speed_bound()
+
+    # A smaller yaw angle, or noise, leaves less to see.
+    assert told(forward_speed_m_per_s=5.0) < told(forward_speed_m_per_s=2.0)
+    noisy = sheet_of(
+        vehicle={"speed_correction": "exact", "forward_speed_m_per_s": 5.0}, echo={"snr_db": 0.0}
+    )
+    assert noisy.speed_bound() > 1.5 * told(forward_speed_m_per_s=5.0)
+    driving = vinsar.load(vehicle={"forward_speed_m_per_s": 5.0, "speed_correction": "exact"})
+    line = f"speed to {design.Sheet(driving).speed_bound():.2g} m/s at best"
+    assert line in design.as_markdown(design.Sheet(driving))
+    assert "at best" not in design.as_markdown(design.Sheet(PAPER))
+
+
 def test_an_obstacle_hides_what_a_ray_over_its_top_misses():
     assert sheet_of().shadow_length(10.0) == pytest.approx(10.0 * 0.3 / 1.7)
     # An antenna just above the top sees 300 times as little of what lies behind.

@@ -7,9 +7,11 @@ import logging
 import numpy as np
 import pytest
 
+import vinsar
 from vinsar.processing import speed
 from vinsar.radar import motion, trajectory, waveform
 from vinsar.simulation import echo
+from vinsar.study import pipeline
 
 EXTENT = (-1.0, 1.0, 10.0, 12.0)
 FREQUENCY = waveform.frequencies(13e9, 15e9, 101)
@@ -83,3 +85,30 @@ def test_the_way_is_the_vehicle_s(rail):
     driven = motion.advance(rail, speed_m_per_s=2.5, duration_s=0.4)
     for name in ("transmitter", "receiver"):
         np.testing.assert_allclose(moved[name], driven[name], atol=1e-15)
+
+
+def test_imaging_gets_the_corrected_speed_from_the_stage(received, driven, monkeypatch):
+    study = vinsar.load(
+        vehicle={
+            "speed_correction": "echoes", "speed_error_m_per_s": 0.1,
+            "forward_speed_m_per_s": 4.0, "scan_duration_s": 0.5,
+        },
+        echo={"snr_db": None},
+    )  # fmt: skip
+    told = []
+
+    def estimate(*_, **options):
+        told.append(options)
+        return speed.Speed(-0.3, 0.01)
+
+    monkeypatch.setattr(speed, "estimate", estimate)
+    given = {"received": received, "recorded_trajectory": driven}
+    found = pipeline.run_stage("autofocus", given, study)
+    moved = trajectory.displaced(driven, found["displacement"].values)
+    slower = motion.advance(driven, speed_m_per_s=-0.3, duration_s=0.5)
+    np.testing.assert_allclose(moved["receiver"], slower["receiver"], atol=1e-12)
+    # What is left is the same for both channels: no error of the phase between them.
+    assert not found["displacement_std"].values.any()
+    assert told == [
+        {"extent": (-2.5, 2.5, 10.0, 16.0), "duration_s": 0.5, "sensor_std_m_per_s": 0.1}
+    ]
