@@ -17,6 +17,12 @@ between the channels, which heights need, is measured position by position and d
 
 The second step starts from the navigated positions or from one of the first step's, whichever the
 image is in better focus with.
+
+A few strong reflectors have no speckle that joins neighbours. Where there are such, `_Sharpest`
+takes the errors of the navigated positions as independent and the true path as smooth: it starts
+from a line through the navigated positions, or the lowest polynomial that they show, and moves it
+by growing polynomials to the sharpest image. It stands if it is sharper than what the other steps
+come to.
 """
 
 from __future__ import annotations
@@ -86,6 +92,20 @@ _PREFERENCE = 1.015
 
 # Gain in focus below which the navigated positions stay: errors that small harm no image.
 _WORTH = 1.03
+
+# Sharpness (2 for speckle and noise) that tells of prominent points, and its gain and the focus
+# that they must show; their cells.
+_PROMINENT, _SHARPER, _LEAST_SHARP_FOCUS, _PROMINENT_CELLS = 4.0, 1.1, 0.4, 64
+
+# Numbers of polynomials along the path that it moves by, and what tells an order of the navigated
+# path from noise, in standard deviations.
+_MOVES, _SIGNIFICANT = (4, 6, 9, 13), 5.0
+
+# Steps by each number at most; gains in sharpness that go on with it, and with the next.
+_MOST_SHARPER, _GOES_ON, _GOES_FARTHER = 20, 2e-3, 1e-2
+
+# Standard deviation, in wavelengths, of what the path is off in each polynomial.
+_SMOOTH_STD = 0.1
 
 # Bounds of the prior's standard deviation in wavelengths, and where it begins.
 _LEAST_STD, _FIRST_STD, _MOST_STD = 0.005, 1.0, 4.0
@@ -206,15 +226,32 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
         found = estimate(echo.isel(position=kept), recorded.isel(position=kept), extent=extent)
         return _spread(found, kept, positions)
     if positions < _LEAST_POSITIONS:
-        return _nothing(
-            channels, positions, f"{positions} positions are too few; take {_LEAST_POSITIONS}"
+        few = f"{positions} positions are too few; take {_LEAST_POSITIONS}"
+        return _told(_nothing(channels, positions, few))
+    image = _Image(_Samples(echo, recorded, extent))
+    return _told(_Sharpest(image).instead_of(_by_speckle(image)))
+
+
+def _told(found: Motion) -> Motion:
+    """Log what was found, as a warning where the echoes tell nothing."""
+    if not found.reason:
+        logger.info(
+            "autofocus: focus from %.0f to %.0f %%", *(100 * share for share in found.focus)
         )
-    samples = _Samples(echo, recorded, extent)
+    else:
+        level = logging.WARNING if np.isnan(found.range_std).all() else logging.INFO
+        logger.log(level, "autofocus: no correction, because %s", found.reason)
+    return found
+
+
+def _by_speckle(image: _Image) -> Motion:
+    """Return the errors by what neighbouring positions see alike, and by the image's energy."""
+    samples = image.samples
+    channels, positions = samples.channels, samples.positions
     error, coherence = _coarse(samples)
     gap = _gap(samples, coherence)
     if gap is not None:
         return _nothing(channels, positions, gap)
-    image = _Image(samples)
     still: Floats = np.zeros((channels, positions, 3))
     start = still
     before = best = image.energy_of(start)
@@ -235,15 +272,21 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
         return _nothing(channels, positions, reason, focus)
     if result.energy < _WORTH * before:
         reason = f"the navigated positions focus to {focus[0]:.0%} already"
-        logger.info("autofocus: no correction, because %s", reason)
         nothing = np.zeros((channels, positions, 3))
         return Motion(nothing, std, nothing[..., 0].copy(), range_std, focus, reason)
-    logger.info("autofocus: focus from %.0f to %.0f %%", *(100 * share for share in focus))
+    return _moved(samples, result.displacement, result.covariance, focus)
+
+
+def _moved(
+    samples: _Samples, displacement: Floats, covariance: Floats, focus: tuple[float, float]
+) -> Motion:
+    """Return displacements with their covariance (channel, position, axis, axis) as applied."""
+    sight = samples.sight()
     return Motion(
-        displacement=result.displacement,
-        displacement_std=std,
-        range_correction=np.einsum("cli,cli->cl", sight, result.displacement),
-        range_std=range_std,
+        displacement=displacement,
+        displacement_std=np.sqrt(np.einsum("clii->cli", covariance)),
+        range_correction=np.einsum("cli,cli->cl", sight, displacement),
+        range_std=np.sqrt(np.einsum("cli,clij,clj->cl", sight, covariance, sight)),
         focus=focus,
     )
 
@@ -251,7 +294,6 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
 def _nothing(
     channels: int, positions: int, reason: str, focus: tuple[float, float] = (np.nan, np.nan)
 ) -> Motion:
-    logger.warning("autofocus: no correction, because %s", reason)
     shape = channels, positions
     return Motion(
         displacement=np.zeros((*shape, 3)),
@@ -781,6 +823,179 @@ def _precision(prior: Floats) -> Floats:
     for axis in range(3):
         result[:, axis, :, axis] = (modes.T / prior[:, axis] ** 2) @ modes
     return result
+
+
+class _Sharpest:
+    """The smooth path along which prominent points make the sharpest image.
+
+    Sharpness is the mean squared intensity over the squared mean, by channel. Its gradient is that
+    of each position's part against the image times the image's power: so prominent points alone
+    count, which have one phase at all positions that see them.
+    """
+
+    def __init__(self, image: _Image) -> None:
+        self.image = image
+        self.samples = samples = image.samples
+        along = np.linspace(-1, 1, samples.positions)
+        powers = np.vander(along, max(_MOVES), increasing=True)
+        self.basis = np.sqrt(samples.positions) * np.linalg.qr(powers)[0]
+        # A shift and a turn of all positions, which no echo contradicts, stay as recorded.
+        self.free = np.ones((max(_MOVES), 3))
+        self.free[0] = self.free[1, 1:] = 0
+
+    def instead_of(self, found: Motion) -> Motion:
+        """Return the displacements to it, or what was found if prominent points speak for that."""
+        samples = self.samples
+        still: Floats = np.zeros_like(samples.transmitter)
+        starts = [still, self.smoothed()]
+        sharpness = np.array([self.sharpness_of(start) for start in starts])
+        if sharpness.max() < _PROMINENT:
+            return found
+        displacement, best = still.copy(), np.zeros(samples.channels)
+        covariance, taken = np.zeros((*still.shape, 3)), still.copy()
+        for start, first in zip(starts, sharpness, strict=True):
+            # A start far less sharp than the other leads nowhere.
+            if (first < sharpness.max(axis=0) / 2).all():
+                continue
+            moved, spread, reached = self.follow(start)
+            better = reached > _PREFERENCE * best
+            best = np.where(better, reached, best)
+            displacement[better], covariance[better] = moved[better], spread[better]
+            taken[better] = start[better]
+        before = self.sharpness_of(found.displacement)
+        if best.min() < _PROMINENT or (best < before).any():
+            return found
+        if best.mean() < _SHARPER * before.mean():
+            return found
+        displacement = self.registered(displacement, (taken[..., 1:] ** 2).mean(axis=(1, 2)))
+        refined = self.image.refine(displacement)
+        recorded = samples.focus(self.image.energy_of(still), still)
+        focus = recorded, samples.focus(refined.energy, refined.displacement)
+        if focus[1] > _LEAST_FOCUS and (
+            self.sharpness_of(refined.displacement).mean() * _PREFERENCE > best.mean()
+        ):
+            return _moved(samples, refined.displacement, refined.covariance, focus)
+        focus = recorded, samples.focus(self.image.energy_of(displacement), displacement)
+        # Echoes from outside the image lower the focus, but a path that shakes leaves next to none.
+        if focus[1] < _LEAST_SHARP_FOCUS:
+            return found
+        logger.info(
+            "autofocus: sharpness %.1f as recorded, %.1f along a smooth path",
+            sharpness[0].mean(),
+            best.mean(),
+        )
+        return _moved(samples, displacement, covariance, focus)
+
+    def smoothed(self) -> Floats:
+        """Return the displacement to the lowest polynomial that the navigated positions show."""
+        place = (self.samples.transmitter + self.samples.receiver) / 2
+        count, orders = self.basis.shape
+        found = self.basis.T @ place / count
+        rest = place - self.basis @ found
+        std = np.sqrt((rest**2).sum(axis=1, keepdims=True) / (count - orders) / count)
+        shown = np.nonzero((np.abs(found) > _SIGNIFICANT * std).any(axis=(0, 2)))[0]
+        order = max(1, int(shown.max(initial=0)))
+        return np.asarray(self.basis[:, : order + 1] @ found[:, : order + 1] - place)
+
+    def registered(self, displacement: Floats, variance: Floats) -> Floats:
+        """Return the displacement with the rails turned until both images lie on each other.
+
+        No echo tells the turn of a rail, but both channels see one scene: of the turn between them
+        each takes the share of its errors' variance (channel,), m^2.
+        """
+        samples = self.samples
+        place = ((samples.transmitter + samples.receiver) / 2 + displacement)[..., 0]
+        place = place - place.mean(axis=1, keepdims=True)
+        turn = np.sqrt((variance / (place**2).sum(axis=1)).sum())
+        rows, angles = self.image.shape
+        spacing = samples.width(float(samples.ranges(samples.cell).mean())) / angles
+        most = int(_SIGNIFICANT * turn / spacing * _OVERSAMPLING)
+        if not most:
+            return displacement
+        image = self.image.form(displacement)[1]
+        grid = np.empty_like(image)
+        grid[:, self.image.order] = image
+        # Zeros beside the image keep its edges apart, those beside the spectrum interpolate.
+        spectra = np.fft.fft(grid.reshape(-1, rows, angles), 2 * angles)
+        cross = np.fft.fftshift(spectra * spectra[:1].conj(), axes=-1)
+        beside = angles * (_OVERSAMPLING - 1)
+        cross = np.fft.ifftshift(np.pad(cross, ((0, 0), (0, 0), (beside, beside))), axes=-1)
+        match = (np.abs(np.fft.ifft(cross)) ** 2).sum(axis=1)
+        steps = np.arange(-most, most + 1)
+        # Sine of angle by which a channel's image is off the first one's.
+        shift = spacing / _OVERSAMPLING * steps[match[:, steps].argmax(axis=1)]
+        weight = 1 / np.maximum(variance, np.finfo(float).tiny)
+        shift -= (weight / weight.sum()) @ shift
+        result = displacement.copy()
+        result[..., 1] += shift[:, None] * place
+        return result
+
+    def sharpness_of(self, displacement: Floats) -> Floats:
+        """Return the sharpness (channel,) of the image."""
+        return self.sharpness(self.image.form(displacement)[1])
+
+    def sharpness(self, image: Complexes) -> Floats:
+        """Return the sharpness (channel,) of an image, 2 for speckle and noise."""
+        power = image.real**2 + image.imag**2
+        tiny = np.finfo(np.float32).tiny
+        return np.asarray((power**2).mean(axis=1) / (power.mean(axis=1) ** 2 + tiny))
+
+    def follow(self, start: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the displacement, its covariance and the sharpness that a start leads to."""
+        # Independent errors leave their mean and their slope in what is fitted to them.
+        left = (start**2).mean(axis=1) / self.samples.positions
+        keep = 1 / ((_SMOOTH_STD * self.samples.wavelength) ** 2 + left)
+        moves = np.zeros((len(start), max(_MOVES), 3))
+        displacement, covariance = start, np.zeros((*start.shape, 3))
+        parts, image, _ = self.image.form(start)
+        reached = self.sharpness(image)
+        for count in _MOVES:
+            before = reached
+            for _ in range(_MOST_SHARPER):
+                moved, spread = self.step(parts, image, displacement, moves[:, :count], keep)
+                candidate = start + np.einsum("lk,cki->cli", self.basis[:, :count], moved)
+                parts, image, _ = self.image.form(candidate)
+                sharpness = self.sharpness(image)
+                if sharpness.mean() < (1 + _GOES_ON) * reached.mean():
+                    break
+                moves[:, :count], covariance = moved, spread
+                displacement, reached = candidate, sharpness
+            if reached.mean() < (1 + _GOES_FARTHER) * before.mean():
+                break
+        return displacement, covariance, reached
+
+    def step(
+        self, parts: Complexes, image: Complexes, displacement: Floats, moves: Floats, keep: Floats
+    ) -> tuple[Floats, Floats]:
+        """Take a step of Gauss and Newton: the moves (channel, polynomial, axis) after it.
+
+        With them goes the covariance (channel, position, axis, axis) of the displacements.
+        """
+        samples = self.samples
+        count = moves.shape[1]
+        basis, free = self.basis[:, :count], self.free[:count]
+        wave = 4 * np.pi / samples.wavelength
+        result, covariance = np.empty_like(moves), np.empty((*displacement.shape, 3))
+        for channel, prior in enumerate(keep):
+            power = np.abs(image[channel]) ** 2
+            chosen = np.argpartition(power, -_PROMINENT_CELLS)[-_PROMINENT_CELLS:]
+            reference = image[channel, chosen] * power[chosen] / (power[chosen] ** 2).sum()
+            found = parts[channel][:, chosen] * reference.conj()
+            gradient = samples.gradient(displacement, self.image.points[chosen])[channel]
+            size = np.abs(found)
+            # The score's variance over the information: what a phase's weight has too much.
+            scatter = (found.imag.sum(axis=1) ** 2).sum() / size.sum()
+            slope = -wave * basis.T @ np.einsum("ls,lsi->li", found.imag, gradient) / scatter
+            curvature = wave**2 * np.einsum("ls,lsi,lsj->lij", size, gradient, gradient) / scatter
+            system = np.einsum("lk,lij,lm->kimj", basis, curvature, basis, optimize=True)
+            precision = np.tile(prior, count)
+            system = system.reshape(3 * count, -1) * np.outer(free, free) + np.diag(precision)
+            inverse = np.linalg.inv(system)
+            slope = free * slope - prior * moves[channel]
+            result[channel] = moves[channel] + (inverse @ slope.ravel()).reshape(count, 3)
+            inverse = inverse.reshape(count, 3, count, 3)
+            covariance[channel] = np.einsum("lk,kimj,lm->lij", basis, inverse, basis, optimize=True)
+        return result, covariance
 
 
 def _autofocus(products: Products, study: Study) -> xr.Dataset:
