@@ -20,9 +20,8 @@ image is in better focus with.
 
 A few strong reflectors have no speckle that joins neighbours. Where there are such, `_Sharpest`
 takes the errors of the navigated positions as independent and the true path as smooth: it starts
-from a line through the navigated positions, or the lowest polynomial that they show, and moves it
-by growing polynomials to the sharpest image. It stands if it is sharper than what the other steps
-come to.
+from these positions, a line through them or a curve, and moves it by growing polynomials to the
+sharpest image. It stands if it is sharper than what the other steps come to.
 """
 
 from __future__ import annotations
@@ -97,9 +96,15 @@ _WORTH = 1.03
 # that they must show; their cells.
 _PROMINENT, _SHARPER, _LEAST_SHARP_FOCUS, _PROMINENT_CELLS = 4.0, 1.1, 0.4, 64
 
+# What a curve must gain in sharpness over a line.
+_MUCH_SHARPER = 1.3
+
 # Numbers of polynomials along the path that it moves by, and what tells an order of the navigated
 # path from noise, in standard deviations.
 _MOVES, _SIGNIFICANT = (4, 6, 9, 13), 5.0
+
+# Shares of a step that are tried in turn, as it may be too long.
+_SHARES = (1.0, 0.5, 0.25)
 
 # Steps by each number at most; gains in sharpness that go on with it, and with the next.
 _MOST_SHARPER, _GOES_ON, _GOES_FARTHER = 20, 2e-3, 1e-2
@@ -847,18 +852,19 @@ class _Sharpest:
         """Return the displacements to it, or what was found if prominent points speak for that."""
         samples = self.samples
         still: Floats = np.zeros_like(samples.transmitter)
-        starts = [still, self.smoothed()]
+        starts = [still, *self.smoothed()]
         sharpness = np.array([self.sharpness_of(start) for start in starts])
         if sharpness.max() < _PROMINENT:
             return found
         displacement, best = still.copy(), np.zeros(samples.channels)
         covariance, taken = np.zeros((*still.shape, 3)), still.copy()
-        for start, first in zip(starts, sharpness, strict=True):
+        for number, (start, first) in enumerate(zip(starts, sharpness, strict=True)):
             # A start far less sharp than the other leads nowhere.
             if (first < sharpness.max(axis=0) / 2).all():
                 continue
             moved, spread, reached = self.follow(start)
-            better = reached > _PREFERENCE * best
+            # Curves that noise bends may sharpen what is no point: a line needs less.
+            better = reached > (_PREFERENCE if number < 2 else _MUCH_SHARPER) * best
             best = np.where(better, reached, best)
             displacement[better], covariance[better] = moved[better], spread[better]
             taken[better] = start[better]
@@ -886,16 +892,16 @@ class _Sharpest:
         )
         return _moved(samples, displacement, covariance, focus)
 
-    def smoothed(self) -> Floats:
-        """Return the displacement to the lowest polynomial that the navigated positions show."""
+    def smoothed(self) -> list[Floats]:
+        """Return the displacements to a line, a parabola and the lowest polynomial that shows."""
         place = (self.samples.transmitter + self.samples.receiver) / 2
         count, orders = self.basis.shape
         found = self.basis.T @ place / count
         rest = place - self.basis @ found
         std = np.sqrt((rest**2).sum(axis=1, keepdims=True) / (count - orders) / count)
         shown = np.nonzero((np.abs(found) > _SIGNIFICANT * std).any(axis=(0, 2)))[0]
-        order = max(1, int(shown.max(initial=0)))
-        return np.asarray(self.basis[:, : order + 1] @ found[:, : order + 1] - place)
+        kept = sorted({2, 3, max(1, int(shown.max(initial=0))) + 1})
+        return [self.basis[:, :some] @ found[:, :some] - place for some in kept]
 
     def registered(self, displacement: Floats, variance: Floats) -> Floats:
         """Return the displacement with the rails turned until both images lie on each other.
@@ -953,13 +959,18 @@ class _Sharpest:
             before = reached
             for _ in range(_MOST_SHARPER):
                 moved, spread = self.step(parts, image, displacement, moves[:, :count], keep)
-                candidate = start + np.einsum("lk,cki->cli", self.basis[:, :count], moved)
-                parts, image, _ = self.image.form(candidate)
-                sharpness = self.sharpness(image)
-                if sharpness.mean() < (1 + _GOES_ON) * reached.mean():
+                for share in _SHARES:
+                    taken = moves[:, :count] + share * (moved - moves[:, :count])
+                    candidate = start + np.einsum("lk,cki->cli", self.basis[:, :count], taken)
+                    trial, image_there, _ = self.image.form(candidate)
+                    sharpness = self.sharpness(image_there)
+                    sharper = sharpness.mean() > (1 + _GOES_ON) * reached.mean()
+                    if sharper:
+                        break
+                if not sharper:
                     break
-                moves[:, :count], covariance = moved, spread
-                displacement, reached = candidate, sharpness
+                moves[:, :count], covariance = taken, spread
+                displacement, reached, parts, image = candidate, sharpness, trial, image_there
             if reached.mean() < (1 + _GOES_FARTHER) * before.mean():
                 break
         return displacement, covariance, reached
