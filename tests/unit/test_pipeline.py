@@ -156,7 +156,7 @@ def test_a_second_pass_and_further_antennas_are_there_when_they_are_asked_for(st
     asked = changed(study, "imaging", surface="estimated")
     asked = changed(asked, "radar", baselines_m=(0.06, 0.3))
     # To the end: what evaluates two channels takes those of the longest baseline.
-    products = pipeline.run(changed(asked, "autofocus", method="echoes"))
+    products = pipeline.run(asked)
     assert set(products) == set(pipeline.stages(asked))
     for name in ("refined", "short_baselines", "images", "registration"):
         variables.check(products[name], name)

@@ -98,6 +98,11 @@ SWEEP = {"over": {"echo.snr_db": [1.0]}, "realizations": 1, "base": {}}
         ({"radar__baselines_m": [0.3, 0.3]}, "radar.baselines_m", "no two of them equal"),
         ({"radar__baselines_m": [-0.1, 0.3]}, "radar.baselines_m", "must rise from above 0"),
         ({"radar__baselines_m": []}, "radar.baselines_m", "at least 1"),
+        (
+            {"radar__baselines_m": [0.06, 0.3], "autofocus__method": "echoes"},
+            "autofocus.method",
+            "takes 2 antennas at most, but radar.baselines_m makes 3",
+        ),
         ({"radar__baselines_m": [0.06, 0.2]}, "radar.baselines_m", "end with radar.baseline_m"),
         ({"unwrapping__method": "baselines"}, "unwrapping.method", "two baselines or more"),
         (

@@ -116,6 +116,9 @@ _SMOOTH_STD = 0.1
 _LEAST_STD, _FIRST_STD, _MOST_STD = 0.005, 1.0, 4.0
 
 
+MOST_CHANNELS = 2
+"""More at one place hold together so well that errors along the aperture weigh nothing beside."""
+
 variables.declare(
     "autofocus",
     {
@@ -211,8 +214,8 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
     Parameters
     ----------
     echo
-        Product ``received`` of two channels, without leakage. Positions that are zero are left out
-        (`health.sound`); the errors on their two sides stand in for theirs.
+        Product ``received`` of one channel or two, without leakage. Positions that are zero are
+        left out (`health.sound`); the errors on their two sides stand in for theirs.
     recorded
         Product ``trajectory``: the navigated positions.
     extent
@@ -225,6 +228,9 @@ def estimate(echo: xr.Dataset, recorded: xr.Dataset, *, extent: Extent) -> Motio
         a warning is logged.
     """
     channels, positions = recorded.sizes["channel"], recorded.sizes["position"]
+    if channels > MOST_CHANNELS:
+        many = f"it takes {MOST_CHANNELS} channels at most, and there are {channels}"
+        return _told(_nothing(channels, positions, many))
     used = echo["echo"].values.any(axis=(0, 2))
     if not used.all():
         kept = np.nonzero(used)[0]
@@ -759,8 +765,7 @@ class _Image:
         wave = 4 * np.pi / samples.wavelength
         # Amplitude and noise by sector: what is not in focus has little of the first.
         amplitude = np.maximum(found.real.mean(axis=1), 0)
-        # Channels see the same speckle: more than two of them tell no more of what they share.
-        weight = amplitude / (found.imag**2).mean(axis=1) * min(1, 2 / channels)
+        weight = amplitude / (found.imag**2).mean(axis=1)
         slope = -wave * np.einsum("cs,clsi,cls->lci", weight, gradient, found.imag)
         curvature = wave**2 * np.einsum(
             "cs,clsi,clsj->clij", weight * amplitude, gradient, gradient

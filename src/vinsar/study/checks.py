@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vinsar.foundations.errors import Fault
+from vinsar.processing.autofocus import MOST_CHANNELS
 from vinsar.radar import aperture, grid, instrument, motion, trajectory, waveform
 from vinsar.radar.instrument import Instrument
 from vinsar.study import work
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from vinsar.evaluation.misregistration import Registration
+    from vinsar.processing.autofocus import Autofocus
     from vinsar.processing.filtering import Filtering
     from vinsar.processing.focusing import Imaging
     from vinsar.processing.height import Height
@@ -440,6 +442,16 @@ def _baselines_settle(radar: Radar, unwrapping: Unwrapping) -> Iterator[Fault]:
         )
 
 
+def _autofocus_of_two(radar: Radar, autofocus: Autofocus) -> Iterator[Fault]:
+    count = len(radar.baselines) + 1
+    if autofocus.method != "none" and count > MOST_CHANNELS:
+        yield Fault(
+            "autofocus.method",
+            autofocus.method,
+            f"takes {MOST_CHANNELS} antennas at most, but radar.baselines_m makes {count}",
+        )
+
+
 def _antennas_fit(radar: Radar, imaging: Imaging) -> Iterator[Fault]:
     if len(radar.baselines) < 2:
         return
@@ -644,6 +656,7 @@ CHECKS = (
         _something_scatters,
         _path_of_positions,
         _baselines_settle,
+        _autofocus_of_two,
     ),
 )
 """In groups: what a group finds wrong is kept from the next."""
