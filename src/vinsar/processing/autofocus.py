@@ -275,17 +275,15 @@ def _by_speckle(image: _Image) -> Motion:
             start, best = other, energy
     result = image.refine(start)
     focus = samples.focus(before, still), samples.focus(result.energy, result.displacement)
-    std = np.sqrt(np.einsum("clii->cli", result.covariance))
-    sight = samples.sight()
-    range_std = np.sqrt(np.einsum("cli,clij,clj->cl", sight, result.covariance, sight))
     if focus[1] < _LEAST_FOCUS:
         reason = f"the echoes of all positions agree to {focus[1]:.0%} only"
         return _nothing(channels, positions, reason, focus)
+    found = _moved(samples, result.displacement, result.covariance, focus)
     if result.energy < _WORTH * before:
         reason = f"the navigated positions focus to {focus[0]:.0%} already"
-        nothing = np.zeros((channels, positions, 3))
-        return Motion(nothing, std, nothing[..., 0].copy(), range_std, focus, reason)
-    return _moved(samples, result.displacement, result.covariance, focus)
+        none = np.zeros_like(found.range_correction)
+        return replace(found, displacement=still, range_correction=none, reason=reason)
+    return found
 
 
 def _moved(
@@ -727,6 +725,12 @@ class _Image:
         result /= np.abs(result).mean() or 1.0
         return result, energy
 
+    def by_range_and_angle(self, image: Complexes) -> Complexes:
+        """Return an image (channel, point) as (channel, range, angle)."""
+        result = np.empty_like(image)
+        result[:, self.order] = image
+        return result.reshape(-1, *self.shape)
+
     def other_channels(self, image: Complexes) -> Complexes:
         """Return the others' images (channel, point) for each channel.
 
@@ -734,9 +738,7 @@ class _Image:
         """
         from scipy.ndimage import uniform_filter
 
-        grid = np.empty_like(image)
-        grid[:, self.order] = image
-        grid = grid.reshape(-1, *self.shape)
+        grid = self.by_range_and_angle(image)
 
         def smooth(values: Floats) -> Floats:
             return np.asarray(uniform_filter(values, _WINDOW, mode="nearest"))
@@ -918,16 +920,14 @@ class _Sharpest:
         place = ((samples.transmitter + samples.receiver) / 2 + displacement)[..., 0]
         place = place - place.mean(axis=1, keepdims=True)
         turn = np.sqrt((variance / (place**2).sum(axis=1)).sum())
-        rows, angles = self.image.shape
+        angles = self.image.shape[1]
         spacing = samples.width(float(samples.ranges(samples.cell).mean())) / angles
         most = int(_SIGNIFICANT * turn / spacing * _OVERSAMPLING)
         if not most:
             return displacement
-        image = self.image.form(displacement)[1]
-        grid = np.empty_like(image)
-        grid[:, self.image.order] = image
+        grid = self.image.by_range_and_angle(self.image.form(displacement)[1])
         # Zeros beside the image keep its edges apart, those beside the spectrum interpolate.
-        spectra = np.fft.fft(grid.reshape(-1, rows, angles), 2 * angles)
+        spectra = np.fft.fft(grid, 2 * angles)
         cross = np.fft.fftshift(spectra * spectra[:1].conj(), axes=-1)
         beside = angles * (_OVERSAMPLING - 1)
         cross = np.fft.ifftshift(np.pad(cross, ((0, 0), (0, 0), (beside, beside))), axes=-1)
