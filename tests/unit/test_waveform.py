@@ -111,3 +111,21 @@ def test_window_width_is_that_of_the_transform_of_a_long_window(name):
     half = np.interp(0.5, power[::-1], u[::-1])
     # The end samples widen or narrow a window of N samples by about 1 / N.
     assert waveform.window_width(name) == pytest.approx(2 * half, rel=2 / count)
+
+
+@pytest.mark.parametrize(
+    ("name", "terms"),
+    [
+        ("rectangular", [1.0]),
+        ("hann", [0.5, 0.5]),
+        ("hamming", [0.54, 0.46]),
+        ("blackman", [0.42, 0.5, 0.08]),
+    ],
+)
+def test_window_width_halves_the_power_of_the_continuous_window(name, terms):
+    # The transform of a0 + 2 sum(a_k / 2 cos(2 pi k t)) on |t| < 1/2 is a sum of sincs.
+    u = waveform.window_width(name) / 2
+    transform = terms[0] * np.sinc(u) + sum(
+        a / 2 * (np.sinc(u - k) + np.sinc(u + k)) for k, a in enumerate(terms) if k
+    )
+    assert (transform / terms[0]) ** 2 == pytest.approx(0.5, abs=1e-12)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
+
+_PREFIX, _REVERSED, _CATEGORICAL = "cmc.", "_r", "S"
 
 
 def find(name: str) -> Colormap:
@@ -28,15 +32,39 @@ def find(name: str) -> Colormap:
     """
     import difflib
 
+    if (table := _crameri().get(name)) is not None:
+        return _read(table, reverse=name.endswith(_REVERSED))
     import matplotlib
-    from cmcrameri import cm
 
     # Not by their registration with Matplotlib: whatever imported them, the answer is one.
-    crameri: dict[str, Any] = {f"cmc.{short}": table for short, table in cm.cmaps.items()}
-    known = crameri if name.startswith("cmc.") else matplotlib.colormaps
+    known = () if name.startswith(_PREFIX) else matplotlib.colormaps
     if name not in known:
-        near = difflib.get_close_matches(name, [*crameri, *known], n=3, cutoff=0.5)
+        near = difflib.get_close_matches(name, [*_crameri(), *known], n=3, cutoff=0.5)
         hint = f"did you mean {' or '.join(dict.fromkeys(near))}?" if near else ""
         raise ValueError(f"there is no colour map '{name}'; {hint or 'try cmc.batlow or viridis'}")
-    found: Colormap = known[name]
+    return matplotlib.colormaps[name]
+
+
+def _crameri() -> dict[str, Path]:
+    """Return the tables of Fabio Crameri's maps by name.
+
+    They are read here because the package's own module loads pyplot and every table, which takes
+    longer than all else that a start waits for.
+    """
+    place = importlib.util.find_spec("cmcrameri")
+    if place is None or not place.submodule_search_locations:
+        raise ImportError("the package cmcrameri is not installed")
+    found = {}
+    for table in sorted(Path(place.submodule_search_locations[0], "cmaps").glob("*.txt")):
+        found[f"{_PREFIX}{table.stem}"] = table
+        if not table.stem.endswith(_CATEGORICAL):
+            found[f"{_PREFIX}{table.stem}{_REVERSED}"] = table
     return found
+
+
+def _read(table: Path, *, reverse: bool) -> Colormap:
+    import numpy as np
+    from matplotlib.colors import ListedColormap
+
+    found = ListedColormap(np.loadtxt(table), name=table.stem)
+    return found.reversed() if reverse else found

@@ -269,8 +269,8 @@ def _from_netcdf(path: Path) -> dict[str, str]:
 def _from_png(path: Path) -> dict[str, str]:
     from PIL import Image
 
+    # It stands before the pixels, which need not be read.
     with Image.open(path) as image:
-        image.load()
         return {str(key): str(value) for key, value in image.info.items()}
 
 

@@ -73,7 +73,7 @@ def _file_of(name: str) -> Path | None:
 @cache
 def _imports(path: Path) -> tuple[Path, ...]:
     found: set[Path | None] = set()
-    for node in _run_nodes(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _run_statements(ast.parse(path.read_text(encoding="utf-8")).body):
         if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
             top, _, inner = node.module.partition(".")
             if top == "vinsar":
@@ -89,9 +89,12 @@ def _imports(path: Path) -> tuple[Path, ...]:
     return tuple(sorted(path for path in found if path is not None))
 
 
-def _run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    """Walk a syntax tree without what stands there for type checkers alone."""
-    for node in ast.iter_child_nodes(tree):
+def _run_statements(block: Iterable[ast.AST]) -> Iterator[ast.AST]:
+    """Walk statements, and those within them, without what stands there for type checkers alone.
+
+    Expressions hold no imports, and most of a syntax tree is expressions.
+    """
+    for node in block:
         typing_only = (
             isinstance(node, ast.If)
             and isinstance(node.test, ast.Name)
@@ -99,7 +102,8 @@ def _run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
         )
         if not typing_only:
             yield node
-            yield from _run_nodes(node)
+            for part in ("body", "handlers", "cases", "orelse", "finalbody"):
+                yield from _run_statements(getattr(node, part, ()))
 
 
 def workflow_files() -> list[Path]:
