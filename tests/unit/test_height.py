@@ -116,7 +116,7 @@ def code(image_height, y, antenna_height=2.0, antenna_y=0.0):
     x = np.arange(float(image_height.shape[1]))
     true_y = geometry.circle_true_y(y[:, None] - antenna_y, image_height, antenna_height)
     true_x = np.broadcast_to(x, image_height.shape)
-    return height.code_dem(image_height, x, y, true_x=true_x, true_y=antenna_y + true_y)
+    return height.DemCoding(x, y, true_x=true_x, true_y=antenna_y + true_y)(image_height)
 
 
 @pytest.mark.parametrize("antenna_y", [0.0, 3.0])
@@ -174,7 +174,7 @@ def test_dem_coding_moves_heights_in_x_and_y(turn):
     for _ in range(60):
         true_x, true_y = grid_x + turn * hill(image_x, image_y), grid_y + hill(image_x, image_y) / 3
         image_x, image_y = true_x, true_y
-    found = height.code_dem(hill(true_x, true_y), x, y, true_x=true_x, true_y=true_y)
+    found = height.DemCoding(x, y, true_x=true_x, true_y=true_y)(hill(true_x, true_y))
     # Linear interpolation over places up to 2.5 cm, stretched by the slope of 0.4 to 3.4 cm,
     # apart: 0.2 / 0.09 x 0.034^2 / 8 along each axis.
     inside = (abs(grid_x) < 0.8) & (grid_y > 8.2) & (grid_y < 9.8)

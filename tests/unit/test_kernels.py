@@ -366,8 +366,10 @@ def test_columns_are_resampled_as_numpy_interpolates_but_not_across_holes(holes,
     axis = np.linspace(0, 3, 31)
     place = axis[:, None] + shuffle * rng.random((31, 6))
     place[rng.random(place.shape) < holes] = np.nan
-    values, found = rng.random(place.shape), np.empty(place.shape)
-    columns.resample(values, place, axis, found)
+    values, found, share = rng.random(place.shape), np.empty(place.shape), np.empty(place.shape)
+    first, second = np.empty((2, *place.shape), np.int32)
+    columns.weigh(place, axis, first, second, share)
+    columns.resample(values, first, second, share, found)
     for column in range(6):
         known = np.isfinite(place[:, column])
         order = np.argsort(place[known, column], kind="stable")

@@ -256,7 +256,7 @@ def test_dem_coding_loses_the_pixels_that_are_missing_and_no_more(seed, share, l
     # All of it is shifted by the same part of a pixel.
     true_x = np.where(missing, np.nan, x + 0 * image)
     true_y = np.where(missing, np.nan, y[:, None] + turn * level)
-    found = height.code_dem(image, x, y, true_x=true_x, true_y=true_y)
+    found = height.DemCoding(x, y, true_x=true_x, true_y=true_y)(image)
     inside = slice(2, -2)
     counted = np.isnan(found[inside]).sum(axis=0), missing[inside].sum(axis=0)
     # Both ends of the column are beyond its outermost pixel by up to two pixels of shift.

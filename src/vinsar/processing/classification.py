@@ -185,8 +185,6 @@ def split_band(
         One for each window of `SPLIT_LOOKS`. No cycles of infinite standard deviation if the
         pixels are too coarse to hold the band.
     """
-    from scipy.ndimage import uniform_filter
-
     spacing = grid.step(x), grid.step(y)
     if spacing[1] >= float(resolution[1].min()):
         none = Cycles(np.zeros(phase.shape), np.full(phase.shape, np.inf))
@@ -210,10 +208,10 @@ def split_band(
         side = uncertainty.window(looks, resolution, spacing)
         area = side[0] * spacing[1] * side[1] * spacing[0]
         cells = area / (3 * resolution[0] * resolution[1])
-        covered = uniform_filter(np.ones(phase.shape), side, mode="constant")
+        covered = uncertainty.mean(np.ones(phase.shape), side, outside="zero")
         sums, variance = [], np.zeros(phase.shape)
         for third in thirds:
-            total, *powers = (_total(values, side) for values in third)
+            total, *powers = (uncertainty.mean(part, side, outside="zero") for part in third)
             coherence = np.abs(total) / np.sqrt(np.maximum(powers[0] * powers[1], _TINY))
             coherence = np.clip(coherence, 0.02, 0.9999)
             variance += (1 - coherence**2) / (2 * coherence**2 * np.maximum(cells * covered, 1))
@@ -225,8 +223,11 @@ def split_band(
 
 def _phasor(phase: Floats) -> NDArray[np.complex64]:
     """Return exp(-i phase) in single precision, which a phase of many cycles needs only after."""
-    left = np.asarray(phase % (2 * np.pi), np.float32)
-    return np.asarray(np.cos(left) - 1j * np.sin(left), np.complex64)
+    from vinsar.kernels import windows
+
+    found = np.empty(phase.shape, np.complex64)
+    windows.rotation(np.ascontiguousarray(phase).ravel(), found.ravel())
+    return found
 
 
 def _outer_thirds(
@@ -245,17 +246,6 @@ def _outer_thirds(
         * np.conj(carrier)
         for sign in (-1, 1)
     ]
-
-
-def _total(values: NDArray[Any], side: tuple[int, int]) -> NDArray[Any]:
-    from scipy.ndimage import uniform_filter
-
-    if np.iscomplexobj(values):
-        return np.asarray(
-            uniform_filter(values.real, side, mode="constant")
-            + 1j * uniform_filter(values.imag, side, mode="constant")
-        )
-    return np.asarray(uniform_filter(values, side, mode="constant"))
 
 
 @dataclass(frozen=True)
@@ -582,7 +572,7 @@ def coded(code: Callable[[Floats], Floats], mask: Flags) -> Flags:
     Parameters
     ----------
     code
-        From the image's pixels to the DEM's cells (`height.code_dem`).
+        From the image's pixels to the DEM's cells (`height.DemCoding`).
     mask
         Pixels (y, x).
     """

@@ -259,59 +259,72 @@ def _turns(missing: Floats, island: NDArray[np.integer], count: int) -> Floats:
     return turns
 
 
-def code_dem(
-    image_height: Floats, x: Floats, y: Floats, *, true_x: Floats, true_y: Floats
-) -> Floats:
-    """Move the image's heights to their true positions and resample them to the grid.
+class DemCoding:
+    """Moves values of the image's pixels to their true positions, and resamples them to the grid.
 
-    The paper's DEM coding. The heights, and the true x, are interpolated linearly in y along each
-    column of the image, and then the heights in x along each row of the grid, where the true x are
+    The paper's DEM coding. Values, and the true x, are interpolated linearly in y along each
+    column of the image, and then the values in x along each row of the grid, where the true x are
     not those of the columns. Where parts overlap (layover) they come in the order of y.
 
     Parameters
     ----------
-    image_height
-        Heights at the image's pixels (y, x), m.
     x, y
         Axes of image and DEM, m.
     true_x, true_y
         Where the pixels belong (y, x), m; NaN where that is not known.
-
-    Returns
-    -------
-    ndarray, shape (y, x)
-        Heights on the grid, m; NaN more than a pixel beyond the outermost known height, and where
-        a pixel's is not known.
-
-    Raises
-    ------
-    ValueError
-        If the heights are not on the axes.
     """
-    from vinsar.kernels import columns
 
-    if image_height.shape != (y.size, x.size):
-        raise ValueError(
-            f"heights of shape {image_height.shape} are not on a grid of {(y.size, x.size)}"
-        )
+    def __init__(self, x: Floats, y: Floats, *, true_x: Floats, true_y: Floats) -> None:
+        self._along_y = _Resampling(true_y, y)
+        self._along_x = None
+        known = np.isfinite(true_y)
+        if not np.array_equal(true_x[known], np.broadcast_to(x, known.shape)[known]):
+            place = self._along_y(true_x)
+            self._along_x = _Resampling(np.ascontiguousarray(place.T), x)
 
-    result = np.empty(image_height.shape)
-    columns.resample(np.ascontiguousarray(image_height, float), true_y, y, result)
-    known = np.isfinite(true_y)
-    if np.array_equal(true_x[known], np.broadcast_to(x, known.shape)[known]):
-        return result
-    place = np.empty(image_height.shape)
-    columns.resample(np.ascontiguousarray(true_x, float), true_y, y, place)
-    rows = np.empty((x.size, y.size))
-    columns.resample(np.ascontiguousarray(result.T), np.ascontiguousarray(place.T), x, rows)
-    return np.ascontiguousarray(rows.T)
+    def __call__(self, values: Floats) -> Floats:
+        """Return values (y, x) on the grid.
+
+        NaN more than a pixel beyond the outermost known place, and where a pixel's is not known.
+
+        Raises
+        ------
+        ValueError
+            If the values are not on the axes.
+        """
+        coded = self._along_y(values)
+        if self._along_x is None:
+            return coded
+        return np.ascontiguousarray(self._along_x(coded.T).T)
+
+
+class _Resampling:
+    """Linear interpolation of columns at an axis, from places (row, column) of their own."""
+
+    def __init__(self, place: Floats, axis: Floats) -> None:
+        from vinsar.kernels import columns
+
+        self._rows = np.empty((2, *place.shape), np.int32)
+        self._share = np.empty(place.shape)
+        columns.weigh(np.ascontiguousarray(place, float), axis, *self._rows, self._share)
+
+    def __call__(self, values: Floats) -> Floats:
+        from vinsar.kernels import columns
+
+        if values.shape != self._share.shape:
+            raise ValueError(
+                f"values of shape {values.shape} are not on a grid of {self._share.shape}"
+            )
+        found = np.empty(values.shape)
+        columns.resample(np.ascontiguousarray(values, float), *self._rows, self._share, found)
+        return found
 
 
 def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> Inverted:
     """Invert the unwrapped phase to heights and code the DEM.
 
     The flat-earth phase (Eq. 11), which focusing on the ground plane has removed, is added back;
-    `aperture.locate` gives the height and the true place of each pixel, and `code_dem` moves it
+    `aperture.locate` gives the height and the true place of each pixel, and `DemCoding` moves it
     there.
 
     Parameters
@@ -334,11 +347,12 @@ def invert(unwrapped: xr.Dataset, images: xr.Dataset, offset: Floats) -> Inverte
     true_x, true_y, image_height = aperture.locate(
         lower, upper, x[None, :], y[:, None], absolute, wavelength
     )
-    height = code_dem(image_height, x, y, true_x=true_x, true_y=true_y)
+    code = DemCoding(x, y, true_x=true_x, true_y=true_y)
+    height = code(image_height)
     unknown = int(np.isnan(height).sum())
     if unknown:
         logger.info("%d of %d cells of the DEM have no height", unknown, height.size)
-    return Inverted(absolute, image_height, true_x, true_y, height)
+    return Inverted(absolute, image_height, true_y, height, code)
 
 
 @dataclass(frozen=True)
@@ -351,17 +365,19 @@ class Inverted:
         Absolute phase of the image's pixels (y, x), rad.
     image_height
         Their heights (y, x), m.
-    true_x, true_y
-        Where they belong (y, x), m.
+    true_y
+        Where they belong along y (y, x), m.
     height
         Heights on the grid (y, x), m.
+    code
+        What moves values of the pixels to the grid.
     """
 
     phase: Floats
     image_height: Floats
-    true_x: Floats
     true_y: Floats
     height: Floats
+    code: DemCoding
 
 
 def reference(x: Floats, y: Floats, options: Height) -> tuple[Floats, Floats, Floats]:
@@ -408,7 +424,7 @@ def _dem(products: Products, study: Study) -> xr.Dataset:
         phase=found.phase,
         height=found.height,
         true_y=found.true_y,
-        code=lambda values: code_dem(values, x, y, true_x=found.true_x, true_y=found.true_y),
+        code=found.code,
         reference=_reference(options, x, y),
         filtering=study.filtering.model_dump(),
         frequency=waveform.sampled(study.radar),

@@ -19,7 +19,8 @@ Three things err in a filtered phase.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -57,6 +58,9 @@ UNIFORM = np.pi**2 / 3
 # Sidelobes of the point response count so far, in resolution cells.
 _REACH_CELLS = 3
 
+# Values along each axis that tell the median resolution.
+_FEW = 16
+
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -82,7 +86,8 @@ def window(
         Rows and columns.
     """
     # Resolution changes slowly: a few of its values tell their median.
-    few = resolution[:, ::4, ::4]
+    down, across = (max(1, size // _FEW) for size in resolution.shape[1:])
+    few = resolution[:, ::down, ::across]
     side = float(np.sqrt(looks * np.median(few[0] * few[1])))
     stretch = np.sqrt(elongation)
     return _odd(side * stretch / spacing[1]), _odd(side / stretch / spacing[0])
@@ -96,17 +101,43 @@ def _area(window_px: tuple[int, int], spacing: Spacing) -> float:
     return window_px[0] * spacing[1] * window_px[1] * spacing[0]
 
 
-def mean(values: NDArray[Any], window_px: tuple[int, int]) -> NDArray[Any]:
-    """Return the mean over a window (rows, columns) around each pixel, real or complex (y, x)."""
-    from scipy.ndimage import uniform_filter
+def mean(
+    values: NDArray[Any], window_px: tuple[int, int], *, outside: Literal["mirror", "zero"] = "mirror"
+) -> NDArray[Any]:
+    """Return the mean over a window around each pixel.
 
-    if np.iscomplexobj(values):
-        parts = (
-            uniform_filter(part.astype(float), window_px) for part in (values.real, values.imag)
-        )
-        real, imag = parts
-        return np.asarray(real + 1j * imag)
-    return np.asarray(uniform_filter(np.asarray(values, float), window_px))
+    Parameters
+    ----------
+    values
+        Real or complex values (y, x).
+    window_px
+        Rows and columns of the window, odd.
+    outside
+        What counts as lying outside the image: its mirror image, or zeros.
+
+    Returns
+    -------
+    ndarray, shape (y, x)
+        Means in double precision.
+    """
+    from vinsar.kernels import windows
+
+    kind = complex if np.iscomplexobj(values) else float
+    parts = np.ascontiguousarray(values, kind).view(float)
+    found = np.empty(values.shape, kind)
+    rows, columns = (
+        _places(size, side, outside) for size, side in zip(values.shape, window_px, strict=True)
+    )
+    windows.mean(parts, rows, columns, window_px, found.view(float))
+    return found
+
+
+@lru_cache(maxsize=256)
+def _places(size: int, side: int, outside: Literal["mirror", "zero"]) -> NDArray[np.integer]:
+    """Return which of so many pixels windows of some side hold, one after the other; -1 for 0."""
+    if outside == "mirror":
+        return np.pad(np.arange(size), side // 2, mode="symmetric")
+    return np.pad(np.arange(size), side // 2, constant_values=-1)
 
 
 def slopes(values: Floats, spacing: Spacing) -> Floats:

@@ -126,6 +126,8 @@ def path(aperture: Aperture, x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> 
         Length of the path, m; twice the slant range of a monostatic antenna.
     """
     out = geometry.slant_range(aperture.transmitter, x, y, z)
+    if aperture.monostatic:
+        return 2 * out
     return out + geometry.slant_range(aperture.receiver, x, y, z)
 
 
@@ -291,29 +293,39 @@ def _above_each_other(lower: Aperture, upper: Aperture) -> bool:
 
 def _path(aperture: Aperture, points: Floats) -> tuple[Floats, Floats]:
     """Return the path to points (3, n) and its gradient (3, n)."""
-    length, gradient = np.zeros(points.shape[1]), np.zeros_like(points)
-    for end in (aperture.transmitter, aperture.receiver):
-        step = points - end[:, None]
-        range_ = np.sqrt((step**2).sum(axis=0))
-        length += range_
-        gradient += step / range_
-    return length, gradient
+    length, gradient = _range(aperture.transmitter, points)
+    if aperture.monostatic:
+        return 2 * length, 2 * gradient
+    back, gradient_back = _range(aperture.receiver, points)
+    return length + back, gradient + gradient_back
+
+
+def _range(end: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Return the distance of points (3, n) from one end of the path, and its gradient (3, n)."""
+    step = points - end[:, None]
+    distance = np.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+    step /= distance
+    return distance, step
 
 
 def _slope(aperture: Aperture, points: Floats) -> tuple[Floats, Floats]:
     """Return the path's slope at points (3, n) and its gradient (3, n)."""
-    slope, gradient = np.zeros(points.shape[1]), np.zeros_like(points)
-    for end, travel in (
+    ends = [
         (aperture.transmitter, aperture.transmitter_travel),
         (aperture.receiver, aperture.receiver_travel),
-    ):
+    ]
+    if aperture.monostatic:
+        ends = [(ends[0][0], 2 * ends[0][1])]
+    slope, gradient = np.zeros(points.shape[1]), np.zeros_like(points)
+    for end, travel in ends:
         if travel.any():
-            step = points - end[:, None]
-            range_ = np.sqrt((step**2).sum(axis=0))
-            step /= range_
+            distance, step = _range(end, points)
             along = travel @ step
             slope -= along
-            gradient -= (travel[:, None] - along * step) / range_
+            step *= along
+            step -= travel[:, None]
+            step /= distance
+            gradient += step
     return slope, gradient
 
 
