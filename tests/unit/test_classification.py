@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import gamma
 
 from vinsar.foundations.constants import SPEED_OF_LIGHT
-from vinsar.processing import classification
+from vinsar.processing import classification, uncertainty
 from vinsar.processing.classification import Cycles, Fan
 from vinsar.radar import aperture
 
@@ -32,7 +32,9 @@ def test_a_shadow_is_found_and_lit_speckle_is_not():
     level = np.ones(shape)
     level[40:60, 30:45] = 0.1
     product = np.abs(level * image) ** 2 + 0j
-    found = classification.shadow(product, resolution=np.full((2, *shape), 1.0), spacing=(1.0, 1.0))
+    found = classification.shadow(
+        product, cells=uncertainty.Cells(np.full((2, *shape), 1.0), (1.0, 1.0))
+    )
     assert found[41:59, 31:44].mean() > 0.97
     far = np.ones(shape, bool)
     far[34:66, 24:51] = False
@@ -116,7 +118,7 @@ def test_the_outer_thirds_of_the_band_tell_a_lost_cycle(lost):
         x=0.05 * np.arange(phase.shape[1]),
         y=y,
         wavelength_m=wavelength,
-        resolution=resolution,
+        cells=uncertainty.Cells(resolution, (0.05, y[1] - y[0])),
         relative_bandwidth=2 / 14,
         rising=False,
     )
@@ -132,7 +134,8 @@ def test_pixels_too_coarse_for_the_band_say_nothing():
     images, phase, antennas, y, wavelength = raised(0.2, np.random.default_rng(8), lines=4)
     found = classification.split_band(
         images, phase, antennas, x=0.05 * np.arange(4), y=y, wavelength_m=wavelength,
-        resolution=np.full((2, *phase.shape), 0.04), relative_bandwidth=2 / 14, rising=False,
+        cells=uncertainty.Cells(np.full((2, *phase.shape), 0.04), (0.05, y[1] - y[0])),
+        relative_bandwidth=2 / 14, rising=False,
     )  # fmt: skip
     assert all(np.isinf(part.std).all() for part in found)
 

@@ -18,14 +18,17 @@ def pair(rng, shape, coherence, gain=1.0, phase=0.0):
     return np.stack([first, gain * second * np.exp(-1j * phase)])
 
 
+def unit_cells(shape):
+    return uncertainty.Cells(np.ones((2, *shape)), SPACING)
+
+
 def estimate(images, phase=0.0):
     shape = images.shape[1:]
     return uncertainty.estimate(
         images,
         np.broadcast_to(np.asarray(phase, float), shape),
         np.zeros(shape),
-        resolution=np.ones((2, *shape)),
-        spacing=SPACING,
+        cells=unit_cells(shape),
         relative_bandwidth=0.1,
     )
 
@@ -43,7 +46,11 @@ def test_intervals_of_a_single_look_hold_what_they_say(coherence):
     images = pair(np.random.default_rng(5), (150, 150), coherence)
     product = images[0] * np.conj(images[1])
     variance = uncertainty.noise_variance(
-        estimate(images), filtering.response_to(product, **NONE), product, product, spacing=SPACING
+        estimate(images),
+        filtering.response_to(product, **NONE),
+        product,
+        product,
+        cells=unit_cells(product.shape),
     )
     error = np.abs(np.angle(product)) / np.sqrt(variance)
     # Binomial: 3 sqrt(0.683 * 0.317 / 22 500) = 0.9 %; the von Mises distribution of a dark pixel
@@ -56,7 +63,11 @@ def test_a_pixel_without_signal_has_no_phase():
     images = np.zeros((2, 12, 12), complex)
     product = images[0]
     variance = uncertainty.noise_variance(
-        estimate(images), filtering.response_to(product, **NONE), product, product, spacing=SPACING
+        estimate(images),
+        filtering.response_to(product, **NONE),
+        product,
+        product,
+        cells=unit_cells(product.shape),
     )
     np.testing.assert_allclose(variance, np.pi**2 / 3)
 
@@ -69,7 +80,9 @@ def test_smoothing_of_a_ramp_is_nothing_and_of_a_parabola_its_curvature():
 
     def smoothed(phase):
         product = np.exp(1j * np.broadcast_to(phase, (80, 80)))
-        found = uncertainty.smoothing(filter_, product, resolution=resolution, spacing=SPACING)
+        found = uncertainty.smoothing(
+            filter_, product, cells=uncertainty.Cells(resolution, SPACING)
+        )
         return found[inner]
 
     np.testing.assert_allclose(smoothed(0.02 * line), 0, atol=1e-6)
@@ -89,7 +102,7 @@ def test_the_reference_errs_as_its_looks_do_and_as_its_ground_does():
     def told(images):
         product = images[0] * np.conj(images[1])
         return product, uncertainty.reference_variance(
-            estimate(images), product, level, where, spacing=SPACING
+            estimate(images), product, level, where, cells=unit_cells(product.shape)
         )
 
     variances, found = [], []
@@ -110,13 +123,13 @@ def test_the_reference_errs_as_its_looks_do_and_as_its_ground_does():
 def test_windows_hold_the_looks_that_they_are_asked_for():
     resolution = np.stack([np.full((3, 3), 0.18), np.full((3, 3), 0.075)])
     for looks in (9, 42, 85):
-        rows, columns = uncertainty.window(looks, resolution, (0.02, 0.01))
+        rows, columns = uncertainty.Cells(resolution, (0.02, 0.01)).window(looks)
         assert rows % 2 == columns % 2 == 1
         # An odd number of pixels is within one of what is asked for.
         assert rows * 0.01 == pytest.approx(np.sqrt(looks * 0.18 * 0.075), abs=0.01)
         assert columns * 0.02 == pytest.approx(np.sqrt(looks * 0.18 * 0.075), abs=0.02)
-    assert uncertainty.window(1, resolution, (5.0, 5.0)) == (1, 1)
-    rows, columns = uncertainty.window(36, resolution, (0.01, 0.01), elongation=4)
+    assert uncertainty.Cells(resolution, (5.0, 5.0)).window(1) == (1, 1)
+    rows, columns = uncertainty.Cells(resolution, (0.01, 0.01)).window(36, elongation=4)
     assert rows == pytest.approx(4 * columns, abs=4)
 
 
@@ -136,7 +149,7 @@ def test_roughness_is_what_the_filter_takes_and_level_ground_has_none():
     def told(phase):
         images = pair(rng, (count, count), coherence, phase=phase)
         product = images[0] * np.conj(images[1])
-        return uncertainty.roughness(filter_, product, resolution=resolution, spacing=SPACING)
+        return uncertainty.roughness(filter_, product, cells=uncertainty.Cells(resolution, SPACING))
 
     passed = np.angle(filter_.apply(np.exp(1j * seen)))
     taken = np.mean((true - passed) ** 2)

@@ -1,4 +1,4 @@
-"""Spectra of overlapping patches: weighting them, and adding the patches up.
+"""Spectra of overlapping patches: weighting them, what weights leave, and adding patches up.
 
 Arrays are (patch along x, column, patch along y, row): what is contiguous lies along y.
 """
@@ -54,6 +54,78 @@ def weigh(spectra: np.ndarray, alpha: float, weights: np.ndarray) -> None:
                 out = weights[j, column, i]
                 for row in range(rows):
                     out[row] = power(out[row] * scale, exponent)
+
+
+@kernel
+def left(weights: np.ndarray, rows: np.ndarray, columns: np.ndarray, power: np.ndarray) -> None:
+    """Add up what weights leave of spectra, each the product of two along the axes.
+
+    Parameters
+    ----------
+    weights
+        Weights (patch along x, column, patch along y, row), float32.
+    rows, columns
+        Power of some spectra along y and along x (patch along y, patch along x, row, spectrum) and
+        (.., column, spectrum), float64.
+    power
+        Output (patch along y, patch along x, spectrum), float64: sums of the squared weights times
+        the spectra.
+    """
+    across, sides, down, count = weights.shape
+    kinds = rows.shape[3]
+    sums = np.empty(kinds)
+    power[:] = 0
+    for j in range(across):
+        for column in range(sides):
+            for i in range(down):
+                values, along = weights[j, column, i], rows[i, j]
+                sums[:] = 0
+                for row in range(count):
+                    square = np.float64(values[row] * values[row])
+                    for kind in range(kinds):
+                        sums[kind] += square * along[row, kind]
+                for kind in range(kinds):
+                    power[i, j, kind] += sums[kind] * columns[i, j, column, kind]
+
+
+@kernel
+def sidebands(
+    weights: np.ndarray,
+    carrier: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    power: np.ndarray,
+    cell: np.ndarray,
+    lost: np.ndarray,
+) -> None:
+    """Add up what patches and resolution cell take from a phase's pairs of sidebands.
+
+    Parameters
+    ----------
+    weights
+        Weights (patch along x, column, patch along y, row), float32.
+    carrier
+        Column and row of the fringe (2, patch along x, patch along y).
+    rows, columns
+        Rows and columns from it to one sideband of each pair (pair,).
+    power, cell
+        Power of each, and the cell's transfer (pair,), float64.
+    lost
+        Output (patch along y, patch along x), float64: the sums of the power times the square of
+        what is not passed.
+    """
+    across, side, down, _ = weights.shape
+    for j in range(across):
+        for i in range(down):
+            column, row = carrier[0, j, i], carrier[1, j, i]
+            scale = 0.5 / max(np.float64(weights[j, column, i, row]), 1e-30)
+            total = 0.0
+            for n in range(rows.size):
+                one = weights[j, (column + columns[n]) % side, i, (row + rows[n]) % side]
+                other = weights[j, (column - columns[n]) % side, i, (row - rows[n]) % side]
+                passed = min(np.float64(one + other) * scale, 1.0) * cell[n]
+                total += power[n] * (1 - passed) ** 2
+            lost[i, j] = total
 
 
 @kernel

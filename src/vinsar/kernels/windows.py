@@ -13,7 +13,11 @@ _ROWS = 8
 
 @kernel
 def mean(
-    values: np.ndarray, rows: np.ndarray, columns: np.ndarray, sides: tuple[int, int], out: np.ndarray
+    values: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    sides: tuple[int, int],
+    out: np.ndarray,
 ) -> None:
     """Average over a window around each pixel, by running sums.
 

@@ -117,13 +117,13 @@ def assess(
         Class of each height (y, x), an index into `classification.CLASSES`.
     """
     x, y = images["x"].values, images["y"].values
-    spacing = _spacing(x, y)
     instrument = Instrument.of(images, frequency)
     across, ahead = x[None, :], y[:, None]
     antennas = instrument.lower, instrument.upper
     flat = aperture.flat_earth_phase(*antennas, across, ahead, instrument.wavelength)
     widening = np.array([_noise_width(name) for name in windows[::-1]])
     resolution = instrument.resolution(across, ahead) * widening[:, None, None]
+    cells = uncertainty.Cells(resolution, (grid.step(x), grid.step(y)))
     pictures = np.nan_to_num(images["image"].values)
     product, smooth = (
         np.nan_to_num(part["interferogram"].values) for part in (interferogram, filtered)
@@ -137,36 +137,34 @@ def assess(
         left, passed = product / turn, smooth / turn
         told, level = absolute - flat - removed, np.zeros(product.shape)
     filter_ = response_to(left, **filtering)
-    noise = uncertainty.estimate(
-        seen, told, level, resolution=resolution, spacing=spacing, relative_bandwidth=bandwidth
-    )
-    by_noise = uncertainty.noise_variance(noise, filter_, left, passed, spacing=spacing)
-    taken = uncertainty.smoothing(filter_, left, resolution=resolution, spacing=spacing)
-    wide = uncertainty.window(uncertainty.NOISE_LOOKS, resolution, spacing)
-    terrain = uncertainty.mean(taken**2, wide)
+    noise = uncertainty.estimate(seen, told, level, cells=cells, relative_bandwidth=bandwidth)
+    by_noise = uncertainty.noise_variance(noise, filter_, left, passed, cells=cells)
+    taken = uncertainty.smoothing(filter_, left, cells=cells)
+    terrain = uncertainty.mean(taken**2, cells.window(uncertainty.NOISE_LOOKS))
     if not (widening > 1 + _SLACK).any():
         # Both tell of the same, the one of relief, the other of rougher ground. Under a weighting
         # pixels share speckle as far as they share ground.
-        rough = uncertainty.roughness(filter_, left, resolution=resolution, spacing=spacing)
+        rough = uncertainty.roughness(filter_, left, cells=cells)
         terrain = np.maximum(terrain, rough)
     own = np.minimum(by_noise + terrain, uncertainty.UNIFORM)
-    shared = _reference_variance(reference, noise, product, own, x, y)
+    shared = _reference_variance(reference, noise, product, own, x, y, cells)
     shared = shared + motion_variance(motion, instrument, reference, x, y)
-    ambiguity = instrument.height_of_ambiguity(across, ahead)
+    per_difference = instrument.height_per_difference(across, ahead)
+    ambiguity = np.abs(instrument.wavelength * per_difference)
     per_phase = ambiguity / (2 * np.pi)
     drift = _drift(instrument, x, y)
     # Interpolation between two pixels along y averages their noise.
-    share = np.where(np.isfinite(true_y), (true_y - ahead) / spacing[1], 0.0) % 1
-    alike = filter_.neighbours(noise.decorrelation, spacing)
+    share = np.where(np.isfinite(true_y), (true_y - ahead) / cells.spacing[1], 0.0) % 1
+    alike = filter_.neighbours(noise.decorrelation, cells.spacing)
     kept = 1 - 2 * share * (1 - share) * (1 - alike)
-    moved = _at_one_place(drift, height, resolution, spacing)
+    moved = _at_one_place(drift, height, cells)
     std = np.sqrt(code((kept * own + shared) * per_phase**2)) * moved
     cycles = classification.split_band(
         pictures, absolute - flat, antennas,
-        x=x, y=y, wavelength_m=instrument.wavelength, resolution=resolution,
+        x=x, y=y, wavelength_m=instrument.wavelength, cells=cells,
         # The phase is -2 pi / lambda times the difference.
         relative_bandwidth=bandwidth,
-        rising=bool(instrument.height_per_difference(x[x.size // 2], y[y.size // 2]) < 0),
+        rising=bool(per_difference[y.size // 2, x.size // 2] < 0),
     )  # fmt: skip
     slack = 2 * np.sqrt(own) * per_phase * np.abs(drift[1])
     held = np.zeros(product.shape, bool)
@@ -176,9 +174,7 @@ def assess(
     kind = classification.classify(
         height,
         std,
-        dark=classification.coded(
-            code, classification.shadow(product, resolution=resolution, spacing=spacing)
-        ),
+        dark=classification.coded(code, classification.shadow(product, cells=cells)),
         folded=classification.coded(code, classification.layover(true_y, slack)),
         variance=code(by_noise),
         cycles=[classification.Cycles(code(part.missing), code(part.std)) for part in cycles],
@@ -188,7 +184,7 @@ def assess(
         antennas=_before(instrument, float(y[0])),
         x=x,
         y=y,
-        window_px=uncertainty.window(classification.SPLIT_LOOKS[0], resolution, spacing),
+        window_px=cells.window(classification.SPLIT_LOOKS[0]),
     )
     alone = np.sqrt(code(kept * own * per_phase**2)) * moved
     for doubt in doubts(reference, height, alone, kind, x=x, y=y):
@@ -256,11 +252,6 @@ def doubts(
             )
 
 
-def _spacing(x: Floats, y: Floats) -> tuple[float, float]:
-    """Return the spacing of the pixels in x and y, m."""
-    return grid.step(x), grid.step(y)
-
-
 def _noise_width(name: waveform.WindowName) -> float:
     """Return by how much a weighting widens the correlation of noise, in resolution cells."""
     power = waveform.window(name, _WEIGHTS) ** 2
@@ -270,21 +261,16 @@ def _noise_width(name: waveform.WindowName) -> float:
 def _drift(instrument: Instrument, x: Floats, y: Floats) -> Floats:
     """Return how a pixel's target moves in x and in y as its height rises (2, y, x), m/m."""
     length, slope = aperture.gradients(instrument.lower, x[None, :], y[:, None])
-    along = np.cross(length, slope, axis=0)
+    along = aperture.cross(length, slope)
     return np.asarray(along[:2] / along[2])
 
 
-def _at_one_place(
-    drift: Floats, height: Floats, resolution: Floats, spacing: tuple[float, float]
-) -> Floats:
+def _at_one_place(drift: Floats, height: Floats, cells: uncertainty.Cells) -> Floats:
     """Return the error at a place over that of a pixel, which moves with its height (y, x)."""
     known = np.isfinite(height)
     level = float(np.median(height[known])) if known.any() else 0.0
-    smooth = uncertainty.mean(
-        np.where(known, height, level),
-        uncertainty.window(uncertainty.PHASE_LOOKS, resolution, spacing),
-    )
-    slope = uncertainty.slopes(smooth, spacing)
+    smooth = uncertainty.mean(np.where(known, height, level), cells.window(uncertainty.PHASE_LOOKS))
+    slope = uncertainty.slopes(smooth, cells.spacing)
     return np.abs(1 - (slope * drift).sum(axis=0))
 
 
@@ -295,15 +281,15 @@ def _reference_variance(
     own: Floats,
     x: Floats,
     y: Floats,
+    cells: uncertainty.Cells,
 ) -> Floats:
     """Return the variance of the phase added to all pixels (y, x), rad^2."""
-    spacing = _spacing(x, y)
     pieces = [part for where in reference.rectangles for part in _pieces(where, reference)]
     # Level ground off the ground plane has a slow phase of its own, which a rectangle hardly sees.
     level = np.zeros(product.shape)
     found = np.array(
         [
-            uncertainty.reference_variance(noise, product, level, part, spacing=spacing)
+            uncertainty.reference_variance(noise, product, level, part, cells=cells)
             if reference.level
             else own[part].mean()
             for part in pieces

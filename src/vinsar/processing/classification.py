@@ -46,8 +46,8 @@ _EDGE_LOOKS = 5.0
 # Side of the surroundings, in square roots of resolution cells; their median is lit ground.
 _SURROUNDINGS_LOOKS = 700.0
 _LEAST_BACKGROUND = 0.3
-# Values along the side of the surroundings that go into their median.
-_NODES = 12
+# Values along the side of the surroundings that go into their median; every so many have one.
+_NODES, _APART = 12, 2
 
 # Windows of the split band: wrong by half a cycle at three standard deviations in the first.
 SPLIT_LOOKS = (22.0, 85.0)
@@ -68,7 +68,7 @@ _HIDDEN = 2.0
 _TINY = float(np.finfo(float).tiny)
 
 
-def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, float]) -> Flags:
+def shadow(product: Complexes, *, cells: uncertainty.Cells) -> Flags:
     """Return which pixels are dark against their surroundings.
 
     Windows whose coherent power is 6 dB and more down, without the lit pixels at their edges. The
@@ -78,10 +78,8 @@ def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, floa
     ----------
     product
         Interferogram (y, x), unfiltered.
-    resolution
-        Resolution in x and y (2, y, x), m.
-    spacing
-        Spacing of the pixels in x and y, m.
+    cells
+        Resolution cells and pixels.
 
     Returns
     -------
@@ -90,36 +88,42 @@ def shadow(product: Complexes, *, resolution: Floats, spacing: tuple[float, floa
     """
     from scipy.ndimage import binary_propagation
 
-    shapes = [
-        uncertainty.window(looks, resolution, spacing, elongation=longer)
-        for looks, longer, _ in _SHADOW
-    ]
+    shapes = [cells.window(looks, elongation=longer) for looks, longer, _ in _SHADOW]
     powers = [np.abs(uncertainty.mean(product, shape)) for shape in shapes]
     usual = np.maximum(
-        _surroundings(powers[0], uncertainty.window(_SURROUNDINGS_LOOKS, resolution, spacing)),
+        _surroundings(powers[0], cells.window(_SURROUNDINGS_LOOKS)),
         max(_LEAST_BACKGROUND * float(np.median(powers[0])), _TINY),
     )
     dark = np.zeros(product.shape, bool)
     for power, shape, (*_, level) in zip(powers, shapes, _SHADOW, strict=True):
         dark |= grow(power < 10 ** (level / 10) * usual, shape)
-    edge = uncertainty.window(_EDGE_LOOKS, resolution, spacing)
-    lit = np.abs(uncertainty.mean(product, edge)) > _EDGE * usual
+    lit = np.abs(uncertainty.mean(product, cells.window(_EDGE_LOOKS))) > _EDGE * usual
     return np.asarray(~binary_propagation(~dark, mask=~dark | lit))
 
 
 def _surroundings(values: Floats, window_px: tuple[int, int]) -> Floats:
     """Return the median of a window around each pixel, from a few of its values."""
-    from scipy.ndimage import map_coordinates, median_filter
+    steps = [max(1, side // _NODES) for side in window_px]
+    reach = [side // step // 2 for side, step in zip(window_px, steps, strict=True)]
+    few = values[:: steps[0], :: steps[1]]
+    around = np.pad(few, [(part, part) for part in reach], mode="symmetric")
+    windows = np.lib.stride_tricks.sliding_window_view(around, [2 * part + 1 for part in reach])
+    nodes = [np.unique(np.append(np.arange(0, size, _APART), size - 1)) for size in few.shape]
+    medians = np.median(windows[np.ix_(*nodes)], axis=(2, 3))
+    for axis, (size, step, node) in enumerate(zip(values.shape, steps, nodes, strict=True)):
+        medians = _interpolated(medians, node * step, size, axis)
+    return medians
 
-    down, across = (max(1, side // _NODES) for side in window_px)
-    sides = [
-        2 * (side // step // 2) + 1 for side, step in zip(window_px, (down, across), strict=True)
-    ]
-    few = median_filter(values[::down, ::across], sides, mode="reflect")
-    rows, columns = np.indices(values.shape)
-    return np.asarray(
-        map_coordinates(few, [rows / down, columns / across], order=1, mode="nearest")
+
+def _interpolated(values: Floats, nodes: NDArray[np.integer], size: int, axis: int) -> Floats:
+    """Return values at nodes along one axis interpolated at so many pixels."""
+    place = np.interp(np.arange(size), nodes, np.arange(nodes.size))
+    before = np.minimum(place.astype(int), max(nodes.size - 2, 0))
+    share = np.expand_dims(place - before, 1 - axis)
+    first, second = (
+        np.take(values, np.minimum(at, nodes.size - 1), axis) for at in (before, before + 1)
     )
+    return np.asarray(first + share * (second - first))
 
 
 def grow(mask: Flags, shape: tuple[int, int]) -> Flags:
@@ -153,7 +157,7 @@ def split_band(
     x: Floats,
     y: Floats,
     wavelength_m: float,
-    resolution: Floats,
+    cells: uncertainty.Cells,
     relative_bandwidth: float,
     rising: bool,
 ) -> list[Cycles]:
@@ -172,8 +176,8 @@ def split_band(
         Axes, m.
     wavelength_m
         Wavelength of the carrier, m.
-    resolution
-        Resolution in x and y (2, y, x), m. Pixels in y must be finer.
+    cells
+        Resolution cells and pixels, which must be finer in y.
     relative_bandwidth
         Bandwidth over the carrier.
     rising
@@ -185,7 +189,7 @@ def split_band(
         One for each window of `SPLIT_LOOKS`. No cycles of infinite standard deviation if the
         pixels are too coarse to hold the band.
     """
-    spacing = grid.step(x), grid.step(y)
+    resolution, spacing = cells.resolution, cells.spacing
     if spacing[1] >= float(resolution[1].min()):
         none = Cycles(np.zeros(phase.shape), np.full(phase.shape, np.inf))
         return [none for _ in SPLIT_LOOKS]
@@ -205,16 +209,15 @@ def split_band(
     turn = 2 * np.pi * float(shares[1] - shares[0])
     result = []
     for looks in SPLIT_LOOKS:
-        side = uncertainty.window(looks, resolution, spacing)
-        area = side[0] * spacing[1] * side[1] * spacing[0]
-        cells = area / (3 * resolution[0] * resolution[1])
+        side = cells.window(looks)
+        count = cells.extent(side) / (3 * resolution[0] * resolution[1])
         covered = uncertainty.mean(np.ones(phase.shape), side, outside="zero")
         sums, variance = [], np.zeros(phase.shape)
         for third in thirds:
             total, *powers = (uncertainty.mean(part, side, outside="zero") for part in third)
             coherence = np.abs(total) / np.sqrt(np.maximum(powers[0] * powers[1], _TINY))
             coherence = np.clip(coherence, 0.02, 0.9999)
-            variance += (1 - coherence**2) / (2 * coherence**2 * np.maximum(cells * covered, 1))
+            variance += (1 - coherence**2) / (2 * coherence**2 * np.maximum(count * covered, 1))
             sums.append(total)
         lacking = np.angle(sums[1] * np.conj(sums[0])) / turn
         result.append(Cycles(lacking if rising else -lacking, np.sqrt(variance) / turn))

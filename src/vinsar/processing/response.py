@@ -31,8 +31,6 @@ _REACH = 3
 # Frequencies along an axis over which rough ground is summed, and the least power that counts.
 _BINS, _LEAST_POWER = 64, 1e-3
 
-_TINY = np.finfo(np.float32).tiny
-
 
 class Response(Protocol):
     """A filter with its weights."""
@@ -203,7 +201,7 @@ class Average:
 class Goldstein:
     """Goldstein's filter with the weights that it found.
 
-    Patches overlap by half here, which is enough for what changes from patch to patch.
+    Patches overlap by three quarters here, whatever the filter's own do.
 
     Parameters
     ----------
@@ -224,7 +222,7 @@ class Goldstein:
         power = (spectra.real**2 + spectra.imag**2).transpose(0, 2, 1, 3)
         strongest = power.reshape(*power.shape[:2], -1).argmax(axis=2)
         # Column and row (patch along x, patch along y) of the strongest line of each spectrum.
-        self.fringe = np.divmod(strongest, patch_px)
+        self.fringe = np.stack(np.divmod(strongest, patch_px))
         self.weights = np.empty(spectra.shape, np.float32)
         kernel.weigh(spectra, alpha, self.weights)
 
@@ -244,28 +242,25 @@ class Goldstein:
 
         The sum over the patch's frequencies of its squared weights times the noise's spectrum.
         """
+        from vinsar.kernels import patches as kernel
+
         patches = self.patches
         part = noise.at(np.ix_(*patches.centers()))
         lag = np.fft.fftfreq(patches.side) * patches.side
-        overlap = 1 - np.abs(lag) / patches.side
-        own, cross = (
-            [
-                np.fft.fft(values * overlap, axis=1).real.reshape(
-                    patches.down, patches.across, patches.side
-                )
-                / patches.side
-                for values in pair
-            ]
-            for pair in zip(
-                *(part.correlations(axis, lag * spacing[axis]) for axis in (1, 0)), strict=True
-            )
+        overlap = (1 - np.abs(lag) / patches.side) / patches.side
+        rows, columns = (
+            np.stack(
+                [
+                    np.fft.fft(values * overlap, axis=1).real
+                    for values in part.correlations(axis, lag * spacing[axis])
+                ],
+                axis=-1,
+            ).reshape(patches.down, patches.across, patches.side, 2)
+            for axis in (1, 0)
         )
-        power = self.weights**2
-        sums = [
-            np.einsum("jcir,ijr,ijc->ij", power, *pair, optimize=True).ravel()
-            for pair in (own, cross)
-        ]
-        found = part.combine(*sums).reshape(patches.down, patches.across)
+        sums = np.empty((patches.down, patches.across, 2))
+        kernel.left(self.weights, rows, columns, sums)
+        found = part.combine(*sums.reshape(-1, 2).T).reshape(patches.down, patches.across)
         left = patches.spread(found)
         # At the edges there is less to average: of as many pixels as it averages inside.
         cell = np.median(noise.resolution[0] * noise.resolution[1]) / (spacing[0] * spacing[1])
@@ -283,21 +278,22 @@ class Goldstein:
         A patch passes a phase as it passes its two sidebands against the fringe, the strongest
         line of its spectrum.
         """
+        from vinsar.kernels import patches as kernel
+
         del shape
-        side = self.patches.side
-        power, cell = ground.spectra(side)
+        power, cell = ground.spectra(self.patches.side)
         rows, columns = np.nonzero(power > _LEAST_POWER * power.max())
-        power, cell = power[rows, columns], cell[rows, columns]
-        each = [place[..., None] for place in np.indices(self.fringe[0].shape)]
-        column, row = (place[..., None] for place in self.fringe)
-
-        def at(sign: int) -> Floats:
-            down, across = (row + sign * rows) % side, (column + sign * columns) % side
-            return np.asarray(self.weights[each[0], across, each[1], down])
-
-        carrier = np.maximum(self.weights[each[0], column, each[1], row], _TINY)
-        passed = np.minimum((at(1) + at(-1)) / (2 * carrier), 1)
-        return self.patches.spread(((1 - passed * cell) ** 2 @ power).T)
+        lost = np.empty((self.patches.down, self.patches.across))
+        kernel.sidebands(
+            self.weights,
+            self.fringe,
+            rows,
+            columns,
+            power[rows, columns],
+            cell[rows, columns],
+            lost,
+        )
+        return self.patches.spread(lost)
 
 
 def gaussian_weights(std_px: float) -> Floats:

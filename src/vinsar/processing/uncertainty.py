@@ -19,7 +19,7 @@ Three things err in a filtered phase.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -58,51 +58,63 @@ UNIFORM = np.pi**2 / 3
 # Sidelobes of the point response count so far, in resolution cells.
 _REACH_CELLS = 3
 
-# Values along each axis that tell the median resolution.
-_FEW = 16
-
 _TINY = float(np.finfo(float).tiny)
 
 
-def window(
-    looks: float, resolution: Floats, spacing: Spacing, *, elongation: float = 1
-) -> tuple[int, int]:
-    """Return the sides of a square window of about so many looks, odd numbers of pixels.
+@dataclass(frozen=True)
+class Cells:
+    """Resolution cells of an image.
 
-    Parameters
+    Attributes
     ----------
-    looks
-        Independent looks: resolution cells in the window.
     resolution
         Resolution in x and y (2, y, x), m.
     spacing
         Spacing of the pixels in x and y, m.
-    elongation
-        How many times longer in y than in x, for a window that is no square.
-
-    Returns
-    -------
-    tuple of int
-        Rows and columns.
     """
-    # Resolution changes slowly: a few of its values tell their median.
-    down, across = (max(1, size // _FEW) for size in resolution.shape[1:])
-    few = resolution[:, ::down, ::across]
-    side = float(np.sqrt(looks * np.median(few[0] * few[1])))
-    stretch = np.sqrt(elongation)
-    return _odd(side * stretch / spacing[1]), _odd(side / stretch / spacing[0])
+
+    resolution: Floats
+    spacing: Spacing
+
+    @cached_property
+    def area(self) -> float:
+        """Median area of a cell, m^2."""
+        # Resolution changes slowly: a few of its values tell their median.
+        few = self.resolution[:, ::4, ::4]
+        return float(np.median(few[0] * few[1]))
+
+    def window(self, looks: float, *, elongation: float = 1) -> tuple[int, int]:
+        """Return the sides of a square window of about so many looks, odd numbers of pixels.
+
+        Parameters
+        ----------
+        looks
+            Independent looks: resolution cells in the window.
+        elongation
+            How many times longer in y than in x, for a window that is no square.
+
+        Returns
+        -------
+        tuple of int
+            Rows and columns.
+        """
+        side, stretch = float(np.sqrt(looks * self.area)), float(np.sqrt(elongation))
+        return _odd(side * stretch / self.spacing[1]), _odd(side / stretch / self.spacing[0])
+
+    def extent(self, window_px: tuple[int, int]) -> float:
+        """Return the area of a window, m^2."""
+        return window_px[0] * self.spacing[1] * window_px[1] * self.spacing[0]
 
 
 def _odd(count: float) -> int:
     return 2 * max(0, round((count - 1) / 2)) + 1
 
 
-def _area(window_px: tuple[int, int], spacing: Spacing) -> float:
-    return window_px[0] * spacing[1] * window_px[1] * spacing[0]
-
-
 def mean(
-    values: NDArray[Any], window_px: tuple[int, int], *, outside: Literal["mirror", "zero"] = "mirror"
+    values: NDArray[Any],
+    window_px: tuple[int, int],
+    *,
+    outside: Literal["mirror", "zero"] = "mirror",
 ) -> NDArray[Any]:
     """Return the mean over a window around each pixel.
 
@@ -178,8 +190,7 @@ def estimate(
     phase: Floats,
     flat: Floats,
     *,
-    resolution: Floats,
-    spacing: Spacing,
+    cells: Cells,
     relative_bandwidth: float,
 ) -> Noise:
     """Return the noise of two images' interferogram.
@@ -193,10 +204,8 @@ def estimate(
         not the ground plane's their displacement.
     flat
         Phase of the ground plane (y, x), rad.
-    resolution
-        Resolution in x and y (2, y, x), m.
-    spacing
-        Spacing of the pixels in x and y, m.
+    cells
+        Resolution cells and pixels.
     relative_bandwidth
         Bandwidth over the carrier.
 
@@ -205,8 +214,8 @@ def estimate(
     Noise
         Power and origin.
     """
-    wide = window(NOISE_LOOKS, resolution, spacing)
-    narrow = window(PHASE_LOOKS, resolution, spacing)
+    resolution, spacing = cells.resolution, cells.spacing
+    wide, narrow = cells.window(NOISE_LOOKS), cells.window(PHASE_LOOKS)
     powers = [mean(np.abs(image) ** 2, wide) for image in images]
     # The channels may differ in gain: both are scaled to their common power.
     ratio = np.sqrt(np.maximum(powers[0], _TINY) / np.maximum(powers[1], _TINY))
@@ -215,7 +224,7 @@ def estimate(
     along = (product * np.conj(unit(mean(product, narrow)))).real
     both = (np.abs(images[0]) ** 2 / ratio + np.abs(images[1]) ** 2 * ratio) / 2
     difference = np.maximum(mean(both - along, wide), 0) / power
-    looks = np.maximum(1.0, _area(narrow, spacing) / (resolution[0] * resolution[1]))
+    looks = np.maximum(1.0, cells.extent(narrow) / (resolution[0] * resolution[1]))
     coherence = unbiased(1 - difference, looks)
     absolute = mean(phase, narrow)
     shift = slopes(absolute, spacing) * resolution / (2 * np.pi)
@@ -264,7 +273,7 @@ def noise_variance(
     product: Complexes,
     filtered: Complexes,
     *,
-    spacing: Spacing,
+    cells: Cells,
 ) -> Floats:
     """Return the variance that noise leaves in the filtered phase.
 
@@ -276,20 +285,19 @@ def noise_variance(
         The filter.
     product, filtered
         Interferogram before and after the filter (y, x).
-    spacing
-        Spacing of the pixels in x and y, m.
+    cells
+        Resolution cells and pixels.
 
     Returns
     -------
     ndarray, shape (y, x)
         Variance, rad^2; that of a uniform phase where there is no signal.
     """
-    resolution = noise.decorrelation.resolution
     if filter_.follows_amplitude:
         amplitude = np.abs(filtered).astype(float)
     else:
-        amplitude = np.abs(mean(product, window(PHASE_LOOKS, resolution, spacing)))
-    gain = filter_.gain(noise.decorrelation, product.shape, spacing)
+        amplitude = np.abs(mean(product, cells.window(PHASE_LOOKS)))
+    gain = filter_.gain(noise.decorrelation, product.shape, cells.spacing)
     left = gain * noise.power
     # Beyond 10 it is uniform, and where there is no signal.
     inverse = np.divide(left, amplitude, out=np.full(left.shape, 10.0), where=amplitude > 0)
@@ -298,9 +306,7 @@ def noise_variance(
     return np.minimum(inverse * (1 + inverse / 2), UNIFORM)
 
 
-def smoothing(
-    filter_: response.Response, product: Complexes, *, resolution: Floats, spacing: Spacing
-) -> Floats:
+def smoothing(filter_: response.Response, product: Complexes, *, cells: Cells) -> Floats:
     """Return what resolution cell and filter have taken away from the phase.
 
     Parameters
@@ -309,22 +315,20 @@ def smoothing(
         The filter.
     product
         Interferogram before the filter (y, x). Its mean over a few looks stands for the terrain.
-    resolution
-        Resolution in x and y (2, y, x), m.
-    spacing
-        Spacing of the pixels in x and y, m.
+    cells
+        Resolution cells and pixels.
 
     Returns
     -------
     ndarray, shape (y, x)
         Filtered less true phase, rad.
     """
-    side = window(PHASE_LOOKS, resolution, spacing)
+    side = cells.window(PHASE_LOOKS)
     signal = mean(product, side)
     amplitude = np.abs(signal)
     spread = [
         _point_power(float(np.median(part)), step)
-        for part, step in zip(resolution, spacing, strict=True)
+        for part, step in zip(cells.resolution, cells.spacing, strict=True)
     ]
 
     start = unit(signal)
@@ -332,9 +336,7 @@ def smoothing(
     return np.asarray(mean(np.angle(again * np.conj(start)), side), float)
 
 
-def roughness(
-    filter_: response.Response, product: Complexes, *, resolution: Floats, spacing: Spacing
-) -> Floats:
+def roughness(filter_: response.Response, product: Complexes, *, cells: Cells) -> Floats:
     """Return the variance of what resolution cell and filter take away from rough ground.
 
     Pixels a resolution cell and more apart in x share no noise, whatever the baseline makes of it
@@ -349,23 +351,21 @@ def roughness(
         The filter.
     product
         Interferogram before the filter (y, x).
-    resolution
-        Resolution in x and y (2, y, x), m.
-    spacing
-        Spacing of the pixels in x and y, m.
+    cells
+        Resolution cells and pixels.
 
     Returns
     -------
     ndarray, shape (y, x)
         Variance, rad^2; 0 where there is no roughness to be seen.
     """
-    trend = window(_TREND_LOOKS, resolution, spacing)
-    cell = float(np.median(resolution[0])), float(np.median(resolution[1]))
+    spacing, trend = cells.spacing, cells.window(_TREND_LOOKS)
+    cell = float(np.median(cells.resolution[0])), float(np.median(cells.resolution[1]))
     seen = product != 0
     if trend == (1, 1) or not seen.any():
         return np.zeros(product.shape)
     around = product * np.conj(unit(mean(product, trend)))
-    few = np.angle(mean(around, window(PHASE_LOOKS, resolution, spacing)))
+    few = np.angle(mean(around, cells.window(PHASE_LOOKS)))
     # Walls and steep slopes are no roughness.
     usual = np.abs(few) < _STANDS_OUT * float(np.median(np.abs(few[seen]))) / _MEDIAN_OF_NORMAL
     left = np.where(usual, product, 0)
@@ -378,13 +378,13 @@ def roughness(
     spectra = lags.spectrum(across), lags.spectrum(amplitude)
     products, pairs = (lags.autocorrelation(part)[used] for part in spectra)
     fits = []
-    for cells in _ROUGH_CELLS:
-        ground = response.Rough(cells * cell[0], cell, spacing, trend)
+    for length in _ROUGH_CELLS:
+        ground = response.Rough(length * cell[0], cell, spacing, trend)
         expected = ground.correlation(lags.count)[used]
         size = max(float(pairs @ expected**2), _TINY)
         fits.append((max(float(products @ expected), 0) ** 2 / size, ground, expected))
     _, ground, expected = max(fits, key=lambda fit: fit[0])
-    wide = window(_ROUGH_LOOKS, resolution, spacing)
+    wide = cells.window(_ROUGH_LOOKS)
     found, weight = (
         mean(part * lags.correlate(spectrum, used, values), wide)
         for part, spectrum, values in (
@@ -395,8 +395,8 @@ def roughness(
     weight = np.maximum(weight, max(_LEAST_WEIGHT * float(np.median(weight)), _TINY))
     # What noise makes of it: the products' correlation over cells of sinc^2 is (2/3)^2 of them.
     own = mean(across**2, wide) / np.maximum(mean(amplitude, wide), _TINY)
-    cells = max(1.0, 4 / 9 * cell[0] * cell[1] / (spacing[0] * spacing[1]))
-    error = own * cells * np.sqrt(2 / (wide[0] * wide[1] * weight))
+    pixels = max(1.0, 4 / 9 * cell[0] * cell[1] / (spacing[0] * spacing[1]))
+    error = own * pixels * np.sqrt(2 / (wide[0] * wide[1] * weight))
     told = np.maximum(found / weight, _TINY)
     # Shrunk by it, so that level ground has hardly any.
     variance = np.maximum(told - error**2 / told, 0)
@@ -467,7 +467,7 @@ def _blur(values: Complexes, along_x: Floats, along_y: Floats) -> Complexes:
 
 
 def reference_variance(
-    noise: Noise, product: Complexes, level: Floats, where: tuple[slice, slice], *, spacing: Spacing
+    noise: Noise, product: Complexes, level: Floats, where: tuple[slice, slice], *, cells: Cells
 ) -> float:
     """Return the variance of the phase that a rectangle of level ground tells.
 
@@ -484,15 +484,15 @@ def reference_variance(
         Phase that the interferogram has there if the ground is level (y, x), rad.
     where
         Rows and columns of the rectangle.
-    spacing
-        Spacing of the pixels in x and y, m.
+    cells
+        Resolution cells and pixels.
 
     Returns
     -------
     float
         Variance, rad^2; at most that of a uniform phase.
     """
-    side = window(PHASE_LOOKS, noise.decorrelation.resolution, spacing)
+    spacing, side = cells.spacing, cells.window(PHASE_LOOKS)
     part = mean(product * np.exp(-1j * level), side)[where]
     middle = tuple(np.array([(axis.start + axis.stop) // 2]) for axis in where)
     here = noise.decorrelation.at(middle)

@@ -103,9 +103,11 @@ class Decorrelation:
         """
         cells = lag_m / self.resolution[axis][:, None]
         lost = np.clip(self.shift[axis], 0, 1)[:, None]
-        moved = self.displacement[:, None] if axis == 1 else np.zeros((1, 1))
         kept = 1 - lost
         own = np.cos(2 * np.pi * lost * cells) * np.sinc(cells) ** 2
+        if axis == 0:
+            return own, (kept * np.sinc(kept * cells)) ** 2
+        moved = self.displacement[:, None]
         cross = kept**2 * np.sinc(kept * (cells + moved)) * np.sinc(kept * (cells - moved))
         return own, cross
 

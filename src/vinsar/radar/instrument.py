@@ -194,7 +194,7 @@ class Instrument:
         """
         length, slope = aperture.gradients(self.lower, x, y)
         other, _ = aperture.gradients(self.upper, x, y)
-        along = np.cross(length, slope, axis=0)
+        along = aperture.cross(length, slope)
         return np.asarray(-along[2] / (along * other).sum(axis=0))
 
     def height_of_ambiguity(self, x: ArrayLike, y: ArrayLike) -> Floats:
