@@ -65,27 +65,26 @@ def left(weights: np.ndarray, rows: np.ndarray, columns: np.ndarray, power: np.n
     weights
         Weights (patch along x, column, patch along y, row), float32.
     rows, columns
-        Power of some spectra along y and along x (patch along y, patch along x, row, spectrum) and
-        (.., column, spectrum), float64.
+        Power of some spectra along y and along x (spectrum, patch along y, patch along x, row) and
+        (.., column), float64.
     power
-        Output (patch along y, patch along x, spectrum), float64: sums of the squared weights times
+        Output (spectrum, patch along y, patch along x), float64: sums of the squared weights times
         the spectra.
     """
     across, sides, down, count = weights.shape
-    kinds = rows.shape[3]
-    sums = np.empty(kinds)
-    power[:] = 0
-    for j in range(across):
-        for column in range(sides):
+    sums = np.empty(count)
+    for kind in range(len(power)):
+        for j in range(across):
             for i in range(down):
-                values, along = weights[j, column, i], rows[i, j]
                 sums[:] = 0
+                for column in range(sides):
+                    values, factor = weights[j, column, i], columns[kind, i, j, column]
+                    for row in range(count):
+                        sums[row] += factor * np.float64(values[row] * values[row])
+                total, along = 0.0, rows[kind, i, j]
                 for row in range(count):
-                    square = np.float64(values[row] * values[row])
-                    for kind in range(kinds):
-                        sums[kind] += square * along[row, kind]
-                for kind in range(kinds):
-                    power[i, j, kind] += sums[kind] * columns[i, j, column, kind]
+                    total += sums[row] * along[row]
+                power[kind, i, j] = total
 
 
 @kernel

@@ -408,11 +408,11 @@ def _dem(products: Products, study: Study) -> xr.Dataset:
     if "refined" in products:
         # The second pass in place of the first: the same quantities, from images of its own.
         refined = unwrapped = products["refined"]
-        images = images.isel(channel=[0, -1]).assign(image=refined["image"])
+        images = trajectory.outer(images).assign(image=refined["image"])
         formed, smooth = refined, refined[["filtered"]].rename(filtered="interferogram")
         removed = refined["surface_phase"].values
     else:
-        images = images.isel(channel=[0, -1])
+        images = trajectory.outer(images)
         formed, smooth, removed = products["interferogram"], products["filtered"], None
     points = reference(x, y, options)
     offset = phase_offset(unwrapped, images, points, trend=options.trend)
@@ -429,7 +429,7 @@ def _dem(products: Products, study: Study) -> xr.Dataset:
         filtering=study.filtering.model_dump(),
         frequency=waveform.sampled(study.radar),
         windows=(study.imaging.range_window, study.imaging.aperture_window),
-        motion=products["autofocus"].isel(channel=[0, -1]),
+        motion=trajectory.outer(products["autofocus"]),
         removed=removed,
     )
     return variables.dataset(

@@ -8,6 +8,7 @@ What it leaves of the noise follows from its weights and the noise's correlation
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -124,6 +125,7 @@ class Rough:
         left = np.outer(*power[::-1]) * (1 - np.outer(*kept[::-1])) ** 2
         return left / left.sum(), np.outer(*cell[::-1])
 
+    @lru_cache(maxsize=16)  # noqa: B019: a few numbers, of as many images as are at work
     def correlation(self, count: int) -> Floats:
         """Return the covariance of an image's pixels over so many distances, as of an FFT."""
         power, cell = self.spectra(count)
@@ -254,13 +256,12 @@ class Goldstein:
                     np.fft.fft(values * overlap, axis=1).real
                     for values in part.correlations(axis, lag * spacing[axis])
                 ],
-                axis=-1,
-            ).reshape(patches.down, patches.across, patches.side, 2)
+            ).reshape(2, patches.down, patches.across, patches.side)
             for axis in (1, 0)
         )
-        sums = np.empty((patches.down, patches.across, 2))
+        sums = np.empty((2, patches.down, patches.across))
         kernel.left(self.weights, rows, columns, sums)
-        found = part.combine(*sums.reshape(-1, 2).T).reshape(patches.down, patches.across)
+        found = part.combine(*sums.reshape(2, -1)).reshape(patches.down, patches.across)
         left = patches.spread(found)
         # At the edges there is less to average: of as many pixels as it averages inside.
         cell = np.median(noise.resolution[0] * noise.resolution[1]) / (spacing[0] * spacing[1])

@@ -154,14 +154,12 @@ def _places(size: int, side: int, outside: Literal["mirror", "zero"]) -> NDArray
 
 def slopes(values: Floats, spacing: Spacing) -> Floats:
     """Return the derivatives of values (y, x) by x and by y (2, y, x); 0 along a single pixel."""
-    return np.stack(
-        [
-            np.gradient(values, step, axis=axis)
-            if values.shape[axis] > 1
-            else np.zeros(values.shape)
-            for axis, step in zip((1, 0), spacing, strict=True)
-        ]
-    )
+    found = np.zeros((2, *values.shape))
+    for lines, along, step in zip((found[0].T, found[1]), (values.T, values), spacing, strict=True):
+        if len(along) > 1:
+            lines[1:-1] = (along[2:] - along[:-2]) / (2 * step)
+            lines[0], lines[-1] = (along[1] - along[0]) / step, (along[-1] - along[-2]) / step
+    return found
 
 
 def unit(values: Complexes) -> Complexes:
@@ -493,7 +491,16 @@ def reference_variance(
         Variance, rad^2; at most that of a uniform phase.
     """
     spacing, side = cells.spacing, cells.window(PHASE_LOOKS)
-    part = mean(product * np.exp(-1j * level), side)[where]
+    # As far around the rectangle as the window reaches.
+    around = tuple(
+        slice(max(0, axis.start - reach // 2), axis.stop + reach // 2)
+        for axis, reach in zip(where, side, strict=True)
+    )
+    inside = tuple(
+        slice(axis.start - wider.start, axis.stop - wider.start)
+        for axis, wider in zip(where, around, strict=True)
+    )
+    part = mean(product[around] * np.exp(-1j * level[around]), side)[inside]
     middle = tuple(np.array([(axis.start + axis.stop) // 2]) for axis in where)
     here = noise.decorrelation.at(middle)
     ratio = float(noise.power[where].mean() / max(np.abs(part.mean()), _TINY))

@@ -15,6 +15,7 @@ otherwise on an ellipse, whose foci are T and R, from the aperture's centre and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +78,7 @@ class Aperture:
         return self.monostatic and not self.receiver_travel[1:].any()
 
 
-def fit(transmitter: Floats, receiver: Floats) -> Aperture:
+def fit(transmitter: ArrayLike, receiver: ArrayLike) -> Aperture:
     """Return the aperture of some antenna positions: straight lines by least squares.
 
     A travel along an axis within the standard error of the positions' scatter counts as none:
@@ -93,21 +94,31 @@ def fit(transmitter: Floats, receiver: Floats) -> Aperture:
     Aperture
         The lines.
     """
-    lines, errors = [], []
-    for positions in (transmitter, receiver):
-        count = len(positions)
-        along = np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1)
-        power = float(along @ along) or 1.0
-        center = positions.mean(axis=0)
-        travel = along @ (positions - center) / power
-        rest = positions - center - along[:, None] * travel
-        scatter = np.sqrt((rest**2).sum(axis=0) / max(count - 2, 1))
-        least = np.maximum(_SIGNIFICANT * scatter / np.sqrt(power), _SAME_M)
-        lines.append((center, np.where(np.abs(travel) > least, travel, 0.0)))
-        errors.append(float(scatter[0]) / np.sqrt(count))
-    (out, out_travel), (back, back_travel) = lines
+    (out, out_travel, error), (back, back_travel, back_error) = (
+        _line(np.ascontiguousarray(positions, float).tobytes())
+        for positions in (transmitter, receiver)
+    )
     # One antenna is both ends: its errors are the same, and their mean no smaller.
-    return Aperture(out, back, out_travel, back_travel, max(errors))
+    return Aperture(out, back, out_travel, back_travel, max(error, back_error))
+
+
+# Stage after stage asks for the lines of the same positions.
+@lru_cache(maxsize=64)
+def _line(data: bytes) -> tuple[Floats, Floats, float]:
+    """Return centre, travel and standard error along x of positions (position, 3), as bytes."""
+    positions = np.frombuffer(data).reshape(-1, 3)
+    count = len(positions)
+    along = np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1)
+    power = float(along @ along) or 1.0
+    center = positions.mean(axis=0)
+    travel = along @ (positions - center) / power
+    rest = positions - center - along[:, None] * travel
+    scatter = np.sqrt((rest**2).sum(axis=0) / max(count - 2, 1))
+    least = np.maximum(_SIGNIFICANT * scatter / np.sqrt(power), _SAME_M)
+    travel = np.where(np.abs(travel) > least, travel, 0.0)
+    for shared in (center, travel):
+        shared.flags.writeable = False
+    return center, travel, float(scatter[0]) / np.sqrt(count)
 
 
 def path(aperture: Aperture, x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Floats:

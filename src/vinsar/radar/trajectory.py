@@ -316,6 +316,11 @@ def apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
     return [found[0], found[-1]] if len(found) > 1 else found
 
 
+def outer(product: xr.Dataset) -> xr.Dataset:
+    """Return a product of its first and its last channel alone."""
+    return product if product.sizes["channel"] == 2 else product.isel(channel=[0, -1])
+
+
 def all_apertures(trajectory: xr.Dataset) -> list[aperture.Aperture]:
     """Return the aperture of each channel, as `apertures` does of two."""
     ends = trajectory["transmitter"].values, trajectory["receiver"].values
