@@ -166,13 +166,14 @@ def statistics(error: NDArray[np.floating], tolerance_m: float) -> dict[str, flo
     result: dict[str, float] = dict.fromkeys(_STATISTICS, np.nan)
     if known.size:
         median = np.median(known)
+        near, far = np.percentile(absolute, (90, 95))
         result = {
             "mean": known.mean(),
             "std": known.std(),
             "median": median,
             "mad": np.median(np.abs(known - median)),
-            "percentile_90_absolute": np.percentile(absolute, 90),
-            "percentile_95_absolute": np.percentile(absolute, 95),
+            "percentile_90_absolute": near,
+            "percentile_95_absolute": far,
             "maximum_absolute": absolute.max(),
         }
     cells = error.size

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from vinsar.foundations import randomness, variables
 from vinsar.foundations.configuration import Section, key
@@ -412,9 +411,14 @@ def point_gain(
         Amplitude relative to perfect focus.
     """
     delay = 2 * (_half_path(recorded, place[:, None]) - _half_path(truth, point)) / SPEED_OF_LIGHT
-    # The frequencies are evenly spaced: the sum over them is a polynomial of the step's phase.
-    step = np.exp(2j * np.pi * delay * (frequency[1] - frequency[0]))
-    profile = polynomial.polyval(step, range_weights) * np.exp(2j * np.pi * delay * frequency[0])
+    # The frequencies are evenly spaced: each phasor is one of a few coarse steps times one of a few
+    # fine ones.
+    fine = int(np.ceil(np.sqrt(frequency.size)))
+    weights = np.zeros((fine, fine))
+    weights.flat[: frequency.size] = range_weights
+    turn = 2j * np.pi * delay[..., None] * np.arange(fine) * (frequency[1] - frequency[0])
+    profile = ((np.exp(fine * turn) @ weights) * np.exp(turn)).sum(axis=-1)
+    profile *= np.exp(2j * np.pi * delay * frequency[0])
     return np.asarray(np.abs(profile @ aperture_weights))
 
 

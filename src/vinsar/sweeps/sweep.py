@@ -32,6 +32,8 @@ from vinsar.study.composition import StudyModel
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from numpy.typing import NDArray
+
     from vinsar.foundations.stage import Products, Stage
     from vinsar.simulation.scene import Scene
     from vinsar.study.options import Sweep
@@ -313,8 +315,8 @@ def _share(case: Study, study: Study) -> Study:
 class _Product:
     """A stage's product with what tells it from others, whole and by channel."""
 
-    def __init__(self, parts: list[tuple[xr.Dataset, str]]) -> None:
-        self.parts = parts
+    def __init__(self, name: str, parts: list[tuple[xr.Dataset, str]]) -> None:
+        self.name, self.parts = name, parts
         self._whole: tuple[xr.Dataset, str] | None = None
         self._channels: list[tuple[xr.Dataset, str]] | None = None
 
@@ -322,7 +324,7 @@ class _Product:
         if self._whole is None:
             whole = self.parts[0]
             if len(self.parts) > 1:
-                joined = _join_channels([part for part, _ in self.parts])
+                joined = _join_channels(self.name, [part for part, _ in self.parts])
                 whole = joined, _digest(*(name for _, name in self.parts))
             self._whole = whole
         return self._whole
@@ -386,7 +388,7 @@ class Memo:
                 self._active -= 1
 
     def _products(self, wanted: tuple[str, ...], study: Study, given: Given) -> Products:
-        made = {name: _Product([product]) for name, product in given.items()}
+        made = {name: _Product(name, [product]) for name, product in given.items()}
         stages = pipeline.needed(wanted, pipeline.stages(study))
         values = study.values({name for stage in stages.values() for name in stage.sections})
         for name, stage in stages.items():
@@ -397,6 +399,7 @@ class Memo:
             inputs |= {key: made[key] for key in stage.optional if key in made}
             if stage.by_channel:
                 made[name] = _Product(
+                    name,
                     [
                         self._get(
                             f"{name}/{label}",
@@ -405,7 +408,7 @@ class Memo:
                             compute,
                         ).parts[0]
                         for index, label in enumerate(_channels(inputs.values()))
-                    ]
+                    ],
                 )
             else:
                 whole = {key: product.whole() for key, product in inputs.items()}
@@ -434,7 +437,7 @@ class Memo:
         if mine:
             try:
                 product = compute({label: data for label, (data, _) in inputs.items()})
-                future.set_result(_Product([(product, _identity(product, key))]))
+                future.set_result(_Product(name, [(product, _identity(product, key))]))
             except BaseException as error:
                 with self._lock:
                     kept.pop(key, None)
@@ -454,19 +457,25 @@ def _split_channel(product: xr.Dataset, number: int) -> xr.Dataset:
     return product.isel(channel=[number]) if "channel" in product.dims else product
 
 
-def _join_channels(parts: list[xr.Dataset]) -> xr.Dataset:
+def _join_channels(product: str, parts: list[xr.Dataset]) -> xr.Dataset:
     """Return one product from its channels' parts; what has no channel is the first part's."""
-    first = parts[0]
     joined = {}
-    for name, values in first.variables.items():
+    for name, values in parts[0].variables.items():
         if "channel" in values.dims:
-            pieces = [part.variables[name].values for part in parts]
-            axis = values.dims.index("channel")
-            joined[name] = (values.dims, np.concatenate(pieces, axis=axis), values.attrs)
+            pieces = [_values(part.variables[name]) for part in parts]
+            joined[str(name)] = np.concatenate(pieces, axis=values.dims.index("channel"))
         else:
-            joined[name] = (values.dims, values.values, values.attrs)
-    coords = {name: joined.pop(name) for name in first.coords}
-    return xr.Dataset(joined, coords)
+            joined[str(name)] = _values(values)
+    labels = {str(name): joined.pop(str(name)) for name in parts[0].coords}
+    return variables.dataset(product, joined, labels)
+
+
+def _values(variable: xr.Variable) -> NDArray[Any]:
+    """Return a variable's values; of an index those that pandas keeps, which xarray would check."""
+    if not isinstance(variable, xr.IndexVariable):
+        return variable.values
+    values = variable.to_index().to_numpy()
+    return values if values.dtype == variable.dtype else values.astype(variable.dtype)
 
 
 def _identity(product: xr.Dataset, origin: str) -> str:
@@ -478,11 +487,11 @@ def _fingerprint(product: xr.Dataset) -> str:
     """Return a digest of a product's numbers and labels."""
     parts: list[str | bytes] = []
     for name, variable in sorted(product.variables.items(), key=lambda item: str(item[0])):
-        values = variable.values
+        values = _values(variable)
         labels = values.dtype.kind in "UO"
         parts += [
             str(name),
-            f"{variable.dims} {values.dtype} {values.shape} {variable.attrs}",
+            f"{variable.dims} {values.dtype.str} {values.shape} {variable.attrs}",
             _text(values.tolist()) if labels else values.tobytes(),
         ]
     return _digest(*parts)
