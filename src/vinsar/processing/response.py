@@ -125,11 +125,16 @@ class Rough:
         left = np.outer(*power[::-1]) * (1 - np.outer(*kept[::-1])) ** 2
         return left / left.sum(), np.outer(*cell[::-1])
 
-    @lru_cache(maxsize=16)  # noqa: B019: a few numbers, of as many images as are at work
     def correlation(self, count: int) -> Floats:
         """Return the covariance of an image's pixels over so many distances, as of an FFT."""
-        power, cell = self.spectra(count)
-        return np.asarray(np.fft.fft2(power * cell**2).real)
+        return _correlation(self, count)
+
+
+# Frame after frame asks for the same.
+@lru_cache(maxsize=16)
+def _correlation(ground: Rough, count: int) -> Floats:
+    power, cell = ground.spectra(count)
+    return np.asarray(np.fft.fft2(power * cell**2).real)
 
 
 @dataclass(frozen=True)
