@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
+from functools import lru_cache, partial
 from pathlib import Path
 
-import dask
 import numpy as np
 
 import vinsar
 from vinsar.foundations import blocks
 from vinsar.foundations.configuration import Study
 from vinsar.study import pipeline
+from vinsar.sweeps import processes
 
 ROOT = Path(__file__).parents[1]
 # What the echo does not change.
@@ -45,46 +47,63 @@ def frames(count=60, workers=2):
 
 
 def frames_of(chain, count, workers):
-    """Measure frames a second of one of `CHAINS`.
-
-    Each frame is computed by one thread; Dask's threads compute frames side by side.
-    """
-    chosen: Study = changed(study(coarse=True), CHAINS[chain])
-    products = pipeline.run(chosen, only="dem")
-    expected = products["dem"]["height"].values
-    stages = pipeline.stages(chosen)
-    given = pipeline.needed(BEFORE, stages)
-    again = [name for name in pipeline.needed(("dem",), stages) if name not in given]
-
-    def frame(_):
-        with blocks.serially():
-            made = {name: products[name] for name in given}
-            for name in again:
-                made[name] = pipeline.run_stage(name, made, chosen)
-        return made["dem"]["height"].values
-
+    """Measure frames a second of one of `CHAINS`, by worker processes as a sweep has them."""
     result = []
-    for threads in (1, workers):
-        with dask.config.set(scheduler="threads", num_workers=threads):
-            blocks.run(frame, ((n,) for n in range(threads)))
-            rates, spent = [], time.process_time()
+    for number in (1, workers):
+        with processes.pool(number) as pool:
+            compute(pool, chain, number)
+            rates, answers = [], []
             for _ in range(3):
                 begin = time.perf_counter()
-                heights = blocks.run(frame, ((n,) for n in range(count)))
+                answers += compute(pool, chain, count)
                 rates.append(count / (time.perf_counter() - begin))
-        spent = (time.process_time() - spent) / (3 * count)
-        same = all(np.array_equal(height, expected, equal_nan=True) for height in heights)
         result.append(
             {
                 "chain": chain,
-                "workers": threads,
+                "workers": number,
                 "frames_per_s": float(np.median(rates)),
                 "all": rates,
-                "core_seconds": spent,
-                "same_bits": same,
+                "core_seconds": float(np.mean([spent for spent, _ in answers])),
+                "same_bits": len({digest for _, digest in answers}) == 1,
             }
         )
     return result
+
+
+def compute(pool, chain, count):
+    """Have workers compute so many frames; return the core's seconds and a digest of each."""
+    answers, lost = [], []
+    pool(
+        partial(frame, chain),
+        [[n] for n in range(count)],
+        answers.append,
+        lambda *a: lost.append(a),
+    )
+    if lost:
+        raise RuntimeError(f"frames were lost: {lost}")
+    return answers
+
+
+def frame(chain, _):
+    """Compute a frame in a worker; return the core's seconds, and a digest of the heights."""
+    chosen, products, again = prepared(chain)
+    begin = time.process_time()
+    with blocks.serially():
+        for name in again:
+            products[name] = pipeline.run_stage(name, products, chosen)
+    spent = time.process_time() - begin
+    return spent, hashlib.sha256(products["dem"]["height"].values.tobytes()).hexdigest()
+
+
+@lru_cache
+def prepared(chain):
+    """Return the study of a chain, its products, and the names of those that a frame computes."""
+    chosen: Study = changed(study(coarse=True), CHAINS[chain])
+    products = pipeline.run(chosen, only="dem")
+    stages = pipeline.stages(chosen)
+    given = pipeline.needed(BEFORE, stages)
+    again = [name for name in pipeline.needed(("dem",), stages) if name not in given]
+    return chosen, products, again
 
 
 def stages(rounds=5, *, coarse=False):
