@@ -98,7 +98,7 @@ def test_transmitter_and_receiver_move_alike_along_one_axis(bistatic, axis):
 
 STANDING = {
     "forward_speed_m_per_s": 0.0, "scan_duration_s": 0.5, "speed_correction": "none",
-    "speed_error_m_per_s": 0.0,
+    "speed_error_m_per_s": 0.0, "scan_interval_s": None,
 }  # fmt: skip
 
 

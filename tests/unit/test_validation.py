@@ -47,6 +47,12 @@ def faults(raw) -> dict[str, str]:
     return {fault.key: fault.allowed for fault in caught.value.faults}
 
 
+MOVING = {
+    "forward_speed_m_per_s": 10.0, "scan_duration_s": 0.1, "speed_correction": "exact",
+    "speed_error_m_per_s": 0.0, "scan_interval_s": None,
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_shipped_study_is_valid(path):
     assert validation.check(validation.read(CONFIG / "paper.yaml", path)).study == path.stem
@@ -208,6 +214,22 @@ SWEEP = {"over": {"echo.snr_db": [1.0]}, "realizations": 1, "base": {}}
             "vehicle.speed_error_m_per_s",
             "at most 9.97 m/s",
         ),
+        *(
+            (
+                {"vehicle": MOVING | {"speed_correction": "next_scan"} | vehicle},
+                f"vehicle.{key}",
+                text,
+            )
+            for vehicle, key, text in (
+                (
+                    {"scan_interval_s": 0.05},
+                    "scan_interval_s",
+                    "at least the time of a scan, 0.1 s",
+                ),
+                ({"scan_interval_s": 2.0}, "forward_speed_m_per_s", "to the end of the next one"),
+                ({"speed_error_m_per_s": 60.0}, "speed_error_m_per_s", "drives into the scene"),
+            )
+        ),
         ({"scene__patches": [BLACK]}, "scene.patches[0].reflectivity", "no echo"),
         ({"radar__position_spacing_m": 0.8}, "radar.position_spacing_m", "makes 2 positions"),
         ({"imaging__grid_spacing_m": 0.0001}, "imaging.grid_spacing_m", "GB in 'images'"),
@@ -344,12 +366,6 @@ def test_claims_are_those_of_a_rail():
 def test_a_transmitter_in_the_scene_is_refused():
     found = faults(changed(radar__transmitter_y_m=10.0, **ARRAY))
     assert "look ahead" in found["scene.y_min_m"]
-
-
-MOVING = {
-    "forward_speed_m_per_s": 10.0, "scan_duration_s": 0.1, "speed_correction": "exact",
-    "speed_error_m_per_s": 0.0,
-}  # fmt: skip
 
 
 def test_a_vehicle_that_reaches_the_scene_before_the_scan_ends_is_refused():

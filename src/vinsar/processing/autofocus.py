@@ -38,8 +38,8 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.processing import focusing, leakage, speed
-from vinsar.radar import grid, trajectory, waveform
+from vinsar.processing import focusing, leakage, next_scan, speed
+from vinsar.radar import grid, motion, trajectory, waveform
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -1019,7 +1019,7 @@ def _autofocus(products: Products, study: Study) -> xr.Dataset:
     x, y = grid.image_axes(study.imaging)
     extent = x[0], x[-1], y[0], y[-1]
     way = np.zeros(recorded["receiver"].shape)
-    if study.vehicle.speed_correction == "echoes":
+    if study.vehicle.speed_correction in ("echoes", "next_scan"):
         way += _way(products, study, extent)
     if study.autofocus.method == "none":
         nothing = np.zeros_like(way)
@@ -1044,27 +1044,37 @@ def _autofocus(products: Products, study: Study) -> xr.Dataset:
 
 def _way(products: Products, study: Study, extent: Extent) -> Floats:
     """Return the displacement (position, axis), m, by what the echoes tell of the speed."""
+    recorded = products["recorded_trajectory"]
+    heard = leakage.clean(products["received"], study)
     duration = trajectory.scan_duration(study.radar, study.vehicle)
-    told = speed.estimate(
-        leakage.clean(products["received"], study),
-        products["recorded_trajectory"],
-        extent=extent,
-        duration_s=duration,
-        sensor_std_m_per_s=study.vehicle.speed_error_m_per_s,
-    )
-    positions = products["recorded_trajectory"].sizes["position"]
-    return speed.way(told.correction, positions=positions, duration_s=duration)
+    sensor = study.vehicle.speed_error_m_per_s
+    if motion.has_next_scan(study.vehicle):
+        told = next_scan.estimate(
+            (heard, leakage.clean(products["next_received"], study)),
+            (recorded, products["next_recorded_trajectory"]),
+            extent=extent,
+            duration_s=duration,
+            interval_s=motion.scan_interval(study.radar, study.vehicle),
+            sensor_std_m_per_s=sensor,
+        )
+    else:
+        told = speed.estimate(
+            heard, recorded, extent=extent, duration_s=duration, sensor_std_m_per_s=sensor
+        )
+    return speed.way(told.correction, positions=recorded.sizes["position"], duration_s=duration)
 
 
 STAGES = {
     "autofocus": Stage(
         _autofocus,
         inputs=("received", "recorded_trajectory"),
+        optional=("next_received", "next_recorded_trajectory"),
         sections=(
             *grid.KEYS,
             "suppression",
             "autofocus",
             "vehicle.speed_correction",
+            "vehicle.scan_interval_s",
             "vehicle.speed_error_m_per_s",
             "vehicle.scan_duration_s",
             *trajectory.SCAN_KEYS,

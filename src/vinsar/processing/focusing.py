@@ -313,7 +313,7 @@ def backproject(
             for begin in range(0, y.size, _ROWS_PER_BLOCK)
         ),
     )
-    logger.info("back-projected %d x %d pixels from %d positions", *image.shape[1:], len(weights))
+    logger.debug("back-projected %d x %d pixels from %d positions", *image.shape[1:], len(weights))
     return variables.dataset(
         "images",
         {

@@ -37,9 +37,14 @@ Spectrum = Literal["white", "sinusoidal", "random_walk"]
 # Points across the scene, and ranges, that the bound of the speed takes.
 _BOUND_POINTS, _BOUND_RANGES = 401, 8
 
+# Points along each side of the ground that the bound of two scans takes.
+_BOUND_SIDE = 40
+
 
 variables.declare("true_trajectory", ANTENNAS)
 variables.declare("recorded_trajectory", ANTENNAS)
+variables.declare("next_true_trajectory", ANTENNAS)
+variables.declare("next_recorded_trajectory", ANTENNAS)
 
 
 class Motion(Section, name="motion"):
@@ -81,10 +86,18 @@ class Vehicle(Section, name="vehicle"):
         gt=0,
         le=60,
     )
-    speed_correction: Literal["none", "exact", "sensor", "echoes"] = key(
-        "the speed that focusing assumes: zero, the true one, that of the speed sensor, or the "
-        "sensor's as the echoes correct it",
+    speed_correction: Literal["none", "exact", "sensor", "echoes", "next_scan"] = key(
+        "the speed that focusing assumes: zero, the true one, that of the speed sensor, the "
+        "sensor's as the echoes correct it, or as they do together with those of the next scan, "
+        "on the cart's way back",
         "section 1",
+    )
+    scan_interval_s: float | None = key(
+        "from the beginning of the scan to that of the next one, at least the time of a scan; null "
+        "for just that",
+        "not given",
+        gt=0,
+        le=60,
     )
     speed_error_m_per_s: float = key(
         "standard deviation of the sensor's error, normal and constant during a scan",
@@ -218,6 +231,40 @@ def advance(trajectory: xr.Dataset, *, speed_m_per_s: float, duration_s: float) 
     return variables.dataset("trajectory", antennas, {"channel": trajectory["channel"].values})
 
 
+def return_scan(
+    trajectory: xr.Dataset, *, speed_m_per_s: float, duration_s: float, interval_s: float
+) -> xr.Dataset:
+    """Let the vehicle drive on and the cart go back: the antenna positions of the next scan.
+
+    Parameters
+    ----------
+    trajectory
+        Product ``trajectory``; its positions are evenly spaced in time.
+    speed_m_per_s
+        Speed of the vehicle, the same in both scans and straight ahead, m/s.
+    duration_s
+        Time from the first position of a scan to the last, s.
+    interval_s
+        Time from the beginning of the scan (`advance`) to that of the next one, s.
+
+    Returns
+    -------
+    xarray.Dataset
+        Product ``trajectory`` with other positions, in the same order along the aperture.
+    """
+    # ASSUME: On its way back the cart stops at the same positions, and the vehicle keeps speed and
+    # heading over both scans.
+    time = return_time(trajectory.sizes["position"], duration_s=duration_s, interval_s=interval_s)
+    way = speed_m_per_s * time[None, :, None] * (np.array(AXES) == "y")
+    antennas = {name: trajectory[name].values + way for name in ("transmitter", "receiver")}
+    return variables.dataset("trajectory", antennas, {"channel": trajectory["channel"].values})
+
+
+def return_time(positions: int, *, duration_s: float, interval_s: float) -> Floats:
+    """Return the time of each position of the next scan, s, from the middle of the first one."""
+    return interval_s - duration_s * np.linspace(-0.5, 0.5, positions)
+
+
 def imaged_place(
     x: ArrayLike, y: ArrayLike, *, true_slope: float, told_slope: float
 ) -> tuple[Floats, Floats]:
@@ -322,6 +369,129 @@ def speed_bound(
     (speed, both), (_, turn) = information
     left = speed - both**2 / turn
     return float(1 / np.sqrt(left)) if left > 0 else float("inf")
+
+
+def next_scan_bound(
+    scans: tuple[xr.Dataset, xr.Dataset],
+    *,
+    extent: tuple[float, float, float, float],
+    wavelength_m: float,
+    range_cell_m: float,
+    incoherent: float,
+    duration_s: float,
+    interval_s: float,
+) -> float:
+    """Return the bound of the speed that two scans of one drive, registered, tell, m/s.
+
+    Each cell of the directions and ranges that both see tells how far one image is off the other
+    to the Cramer-Rao bound of speckle of unknown phase (docs/autofocus.md). The height of each
+    cell, which displaces its images as well, is known from the phase between the antennas alone.
+
+    Parameters
+    ----------
+    scans
+        Product ``trajectory`` of both (`advance`, `return_scan`), with the vehicle's motion.
+    extent
+        Ground that scatters (x_min, x_max, y_min, y_max), m, ahead of the antennas.
+    wavelength_m, range_cell_m
+        Wavelength and resolution in slant range, m.
+    incoherent
+        Share of the power that is noise, of each scan's own.
+    duration_s, interval_s
+        As in `return_scan`.
+
+    Returns
+    -------
+    float
+        Standard deviation, m/s; infinite where the scans tell nothing.
+    """
+    count = scans[0].sizes["position"]
+    times = (
+        duration_s * np.linspace(-0.5, 0.5, count),
+        return_time(count, duration_s=duration_s, interval_s=interval_s),
+    )
+    axes = [np.linspace(*ends, _BOUND_SIDE + 1) for ends in (extent[:2], extent[2:])]
+    grid = np.stack(np.meshgrid(*[(axis[1:] + axis[:-1]) / 2 for axis in axes]), -1)
+    points = np.concatenate([grid.reshape(-1, 2), np.zeros((_BOUND_SIDE**2, 1))], axis=1)
+    area = (extent[1] - extent[0]) * (extent[3] - extent[2]) / len(points)
+    looks = 2 * (1 - incoherent) ** 2 / (1 - (1 - incoherent) ** 2)
+    sides, moves, cosines = [], [], []
+    height = np.zeros(len(points))
+    for scan, time in zip(scans, times, strict=True):
+        # The outer antennas.
+        lower, upper = (_rays(scan.isel(channel=channel), points) for channel in (0, -1))
+        move = image_moves(scan, time, points)
+        moves.append(move)
+        direction = np.arctan2(lower[..., 0], lower[..., 1])
+        sides.append((direction.min(axis=1), direction.max(axis=1)))
+        cosine, other = (np.hypot(ray[..., 0], ray[..., 1]).mean(axis=1) for ray in (lower, upper))
+        cosines.append(cosine)
+        band = cosine / range_cell_m
+        shared = (1 - incoherent) * np.maximum(
+            1 - 2 * np.abs(cosine - other) / wavelength_m / band, 0
+        )
+        change = upper[..., 2].sum(axis=1) - np.einsum("plk,pk->p", upper[..., :2], move[..., 1])
+        change *= 4 * np.pi / wavelength_m / count
+        cells = band * 2 / wavelength_m * cosine * np.ptp(direction, axis=1) * area
+        height += cells * 2 * shared**2 / (1 - shared**2) * change**2
+    low, high = (
+        pick(ends, axis=0)
+        for pick, ends in zip((np.max, np.min), zip(*sides, strict=True), strict=True)
+    )
+    cosine = np.mean(cosines, axis=0)
+    bands = np.stack(
+        [
+            2 / wavelength_m * cosine * np.maximum(high - low, 0),
+            np.maximum(
+                cosine / range_cell_m - 2 / wavelength_m * np.abs(cosines[0] - cosines[1]), 0
+            ),
+        ]
+    )
+    middle = (low + high) / 2
+    turned = np.array([[np.cos(middle), -np.sin(middle)], [np.sin(middle), np.cos(middle)]])
+    apart = np.einsum("akp,pkc->apc", turned, moves[0] - moves[1])
+    weight = looks * (2 * np.pi * bands) ** 2 / 12 * bands.prod(axis=0) * area
+    information = scans[0].sizes["channel"] * np.einsum("ap,apc,apd->cdp", weight, apart, apart)
+    left = information[0, 0] - information[0, 1] ** 2 / (information[1, 1] + height)
+    total = float(left.sum())
+    return 1 / np.sqrt(total) if total > 0 else float("inf")
+
+
+def image_moves(antennas: xr.Dataset, time: Floats, points: Floats) -> Floats:
+    """Return how the images of points move on the ground with speed and height, to first order.
+
+    To where the half paths of the first channel, from all positions, are what they were, by least
+    squares.
+
+    Parameters
+    ----------
+    antennas
+        Product ``trajectory``: the positions that focusing assumes.
+    time
+        When the antennas are there (position,), s, from when the vehicle is where it is known.
+    points
+        Points (point, 3), m.
+
+    Returns
+    -------
+    ndarray, shape (point, 2, 2)
+        Change of x and y with the speed that focusing assumes, s, and with the height of the
+        point above the surface that it is focused on, 1.
+    """
+    rays = _rays(antennas.isel(channel=0), points)
+    ground = rays[..., :2]
+    normal = np.linalg.inv(np.einsum("plk,plm->pkm", ground, ground))
+    causes = np.stack([time * rays[..., 1], rays[..., 2]], axis=-1)
+    return np.asarray(normal @ np.einsum("plk,plc->pkc", ground, causes))
+
+
+def _rays(antennas: xr.Dataset, points: Floats) -> Floats:
+    """Return the half paths' derivatives by the points (point, position, axis)."""
+    result = np.zeros((len(points), antennas.sizes["position"], 3))
+    for name in ("transmitter", "receiver"):
+        ray = points[:, None] - antennas[name].values
+        result += ray / np.linalg.norm(ray, axis=-1, keepdims=True) / 2
+    return result
 
 
 def _half_path(antennas: xr.Dataset, point: Floats) -> Floats:
@@ -447,7 +617,7 @@ def sufficient_error(errors: Floats, spread: Floats, *, factor: float) -> float:
     return float(np.interp(limit, spread[last - 1 : last + 1], errors[last - 1 : last + 1]))
 
 
-def _displaced(products: Products, study: Study, affected: str) -> xr.Dataset:
+def _displaced(products: Products, study: Study, affected: str, *scan: int) -> xr.Dataset:
     options = study.motion
     if options.affects != affected or options.level_wavelengths == 0:
         return products["trajectory"]
@@ -461,7 +631,7 @@ def _displaced(products: Products, study: Study, affected: str) -> xr.Dataset:
             spectrum=options.spectrum,
             cycles_per_aperture=options.cycles_per_aperture,
             rng=randomness.generator(
-                study, Draw.MOTION, channel if options.channels == "independent" else 0
+                study, Draw.MOTION, channel if options.channels == "independent" else 0, *scan
             ),
         )
 
@@ -477,7 +647,7 @@ def _true_trajectory(products: Products, study: Study) -> xr.Dataset:
 
 
 def told_speed(study: Study) -> float:
-    """Return the speed that the recorded positions have, m/s: the sensor's for ``echoes``."""
+    """Return the speed that the recorded positions have, m/s: the sensor's if echoes correct it."""
     options = study.vehicle
     if options.speed_correction == "none":
         return 0.0
@@ -495,6 +665,39 @@ def _recorded_trajectory(products: Products, study: Study) -> xr.Dataset:
         speed_m_per_s=told_speed(study),
         duration_s=trajectory.scan_duration(study.radar, study.vehicle),
     )
+
+
+def has_next_scan(vehicle: Vehicle) -> bool:
+    """Return whether there is a next scan (section ``vehicle``)."""
+    return vehicle.speed_correction == "next_scan"
+
+
+def scan_interval(radar: trajectory.Radar, vehicle: Vehicle) -> float:
+    """Return the time from the beginning of the scan to that of the next one, s."""
+    if vehicle.scan_interval_s is not None:
+        return vehicle.scan_interval_s
+    return trajectory.scan_duration(radar, vehicle)
+
+
+# Position errors of the next scan are drawn by themselves.
+_NEXT = 1
+
+
+def _next(products: Products, study: Study, affected: str, speed_m_per_s: float) -> xr.Dataset:
+    return return_scan(
+        _displaced(products, study, affected, _NEXT),
+        speed_m_per_s=speed_m_per_s,
+        duration_s=trajectory.scan_duration(study.radar, study.vehicle),
+        interval_s=scan_interval(study.radar, study.vehicle),
+    )
+
+
+def _next_true_trajectory(products: Products, study: Study) -> xr.Dataset:
+    return _next(products, study, "true", study.vehicle.forward_speed_m_per_s)
+
+
+def _next_recorded_trajectory(products: Products, study: Study) -> xr.Dataset:
+    return _next(products, study, "recorded", told_speed(study))
 
 
 STAGES = {
@@ -520,5 +723,31 @@ STAGES = {
             "vehicle",
             *trajectory.SCAN_KEYS,
         ),
+    ),
+    "next_true_trajectory": Stage(
+        _next_true_trajectory,
+        inputs=("trajectory",),
+        sections=(
+            *randomness.KEYS,
+            *waveform.KEYS,
+            "motion",
+            "vehicle.forward_speed_m_per_s",
+            "vehicle.scan_duration_s",
+            "vehicle.scan_interval_s",
+            *trajectory.SCAN_KEYS,
+        ),
+        when=lambda study: has_next_scan(study.vehicle),
+    ),
+    "next_recorded_trajectory": Stage(
+        _next_recorded_trajectory,
+        inputs=("trajectory",),
+        sections=(
+            *randomness.KEYS,
+            *waveform.KEYS,
+            "motion",
+            "vehicle",
+            *trajectory.SCAN_KEYS,
+        ),
+        when=lambda study: has_next_scan(study.vehicle),
     ),
 }

@@ -18,8 +18,9 @@ from vinsar.foundations.constants import SPEED_OF_LIGHT
 from vinsar.foundations.randomness import Draw
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import Variable
-from vinsar.radar import trajectory, waveform
+from vinsar.radar import motion, trajectory, waveform
 from vinsar.radar.trajectory import ANTENNAS
+from vinsar.simulation import visibility as sight
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,6 +43,9 @@ what single precision does, some -118 dB, either way.
 Weighting = Literal["amplitude", "power"]
 _POSITIONS_PER_BLOCK = 27
 
+# Noise and coupling of the next scan are drawn by themselves.
+_NEXT = 1
+
 
 ECHO = {
     "echo": Variable(
@@ -56,6 +60,7 @@ ECHO = {
 
 variables.declare("echo", ECHO)
 variables.declare("received", ECHO)
+variables.declare("next_received", ECHO)
 variables.declare("measurement", ECHO | ANTENNAS)
 
 
@@ -442,7 +447,30 @@ def _echo(products: Products, study: Study) -> xr.Dataset:
 
 
 def _received(products: Products, study: Study) -> xr.Dataset:
-    clean, options = products["echo"], study.echo
+    return _as_received(products["echo"], products, study)
+
+
+def _next_received(products: Products, study: Study) -> xr.Dataset:
+    options, antennas = study.echo, products["next_true_trajectory"]
+    seen = (
+        sight.facet_visibility(products["terrain"], products["facets"], antennas)
+        if options.occlusion
+        else None
+    )
+    clean = simulate(
+        products["facets"],
+        antennas,
+        seen,
+        frequency=waveform.sampled(study.radar),
+        reflectivity=options.reflectivity,
+        spreading=options.spreading,
+        accuracy_db=options.accuracy_db,
+    )
+    return _as_received(clean, products, study, _NEXT)
+
+
+def _as_received(clean: xr.Dataset, products: Products, study: Study, *scan: int) -> xr.Dataset:
+    options = study.echo
     if options.snr_db is None and options.coupling_db is None:
         return clean
     # The antennas at rest: over a whole scan a vehicle in motion sees a wider swath than from any
@@ -454,7 +482,7 @@ def _received(products: Products, study: Study) -> xr.Dataset:
 
     def rngs(purpose: Draw) -> list[np.random.Generator]:
         return [
-            randomness.generator(study, purpose, channel)
+            randomness.generator(study, purpose, channel, *scan)
             for channel in range(clean.sizes["channel"])
         ]
 
@@ -505,5 +533,12 @@ STAGES = {
             "echo.coupling_path_m",
             "echo.coupling_variation_db",
         ),
+    ),
+    "next_received": Stage(
+        _next_received,
+        inputs=("terrain", "facets", "trajectory", "next_true_trajectory"),
+        sections=(*randomness.KEYS, *waveform.KEYS, "echo"),
+        parallel=True,
+        when=lambda study: motion.has_next_scan(study.vehicle),
     ),
 }

@@ -204,13 +204,14 @@ def _heights_below_antennas(
 
 
 def _told_short(radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle) -> Iterator[Fault]:
-    if vehicle.speed_correction not in ("sensor", "echoes"):
+    if vehicle.speed_correction not in ("sensor", "echoes", "next_scan"):
         return
     # Beyond four standard deviations lies one draw in 30,000.
     told = vehicle.forward_speed_m_per_s + 4 * vehicle.speed_error_m_per_s
     room = min(scene.y_min_m, imaging.y_min_m) - _foremost(radar) - scene.facet_size_m
-    if told * vehicle.scan_duration_s / 2 > room > 0:
-        most = (2 * room / vehicle.scan_duration_s - vehicle.forward_speed_m_per_s) / 4
+    last = _last(radar, vehicle)
+    if told * last > room > 0:
+        most = (room / last - vehicle.forward_speed_m_per_s) / 4
         yield Fault(
             "vehicle.speed_error_m_per_s",
             vehicle.speed_error_m_per_s,
@@ -287,6 +288,45 @@ def _claims_judged(measurement: Measurement, outputs: Outputs) -> Iterator[Fault
 def _duration_key(radar: Radar) -> str:
     """Return the key that gives the duration of a scan."""
     return "vehicle.scan_duration_s" if radar.system == "rail" else "radar.dwell_s"
+
+
+def _last(radar: Radar, vehicle: Vehicle) -> float:
+    """Return the time from the middle of the scan to the end of all, s."""
+    half = trajectory.scan_duration(radar, vehicle) / 2
+    after = motion.scan_interval(radar, vehicle) if motion.has_next_scan(vehicle) else 0.0
+    return half + after
+
+
+def _next_scan(
+    radar: Radar, scene: Scene, imaging: Imaging, vehicle: Vehicle, measurement: Measurement
+) -> Iterator[Fault]:
+    if not motion.has_next_scan(vehicle):
+        return
+    if measurement.file is not None:
+        yield Fault(
+            "vehicle.speed_correction",
+            vehicle.speed_correction,
+            "needs a simulated vehicle: a file of measured echoes holds one scan",
+        )
+        return
+    duration = trajectory.scan_duration(radar, vehicle)
+    if vehicle.scan_interval_s is not None and vehicle.scan_interval_s < duration:
+        yield Fault(
+            "vehicle.scan_interval_s",
+            vehicle.scan_interval_s,
+            f"must be at least the time of a scan, {duration:.3g} s ({_duration_key(radar)})",
+        )
+        return
+    speed, last = vehicle.forward_speed_m_per_s, _last(radar, vehicle)
+    room = min(scene.y_min_m, imaging.y_min_m) - _foremost(radar) - scene.facet_size_m
+    if speed * duration / 2 <= room < speed * last:
+        yield Fault(
+            "vehicle.forward_speed_m_per_s",
+            speed,
+            f"must be at most {room / last:.3g} m/s with vehicle.speed_correction next_scan: the "
+            f"vehicle drives {speed * last:.3g} m from the middle of the scan to the end of the "
+            "next one, into scene or image",
+        )
 
 
 def _drives_short(
@@ -653,6 +693,7 @@ CHECKS = (
         _reference_determines,
         _heights_below_antennas,
         _told_short,
+        _next_scan,
         _something_scatters,
         _path_of_positions,
         _baselines_settle,
