@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from vinsar.processing import filtering, response, uncertainty
 
@@ -162,3 +164,27 @@ def test_roughness_is_what_the_filter_takes_and_level_ground_has_none():
     # A plane is not rough.
     ramp = 0.2 * np.arange(count) + np.zeros((count, count))
     assert told(ramp).mean() < 0.1 * taken
+
+
+@settings(max_examples=30)
+@given(
+    shape=st.tuples(st.integers(1, 19), st.integers(1, 17)),
+    sides=st.tuples(st.sampled_from([1, 3, 5, 21]), st.sampled_from([1, 3, 7, 25])),
+    outside=st.sampled_from(["mirror", "zero"]),
+    parts=st.sampled_from([1, 2]),
+)
+def test_means_are_those_of_the_windows(shape, sides, outside, parts):
+    values = np.random.default_rng(sum(shape)).normal(size=(*shape, parts))
+    values = values.view(complex)[..., 0] if parts == 2 else values[..., 0]
+    around = [(side // 2, side // 2) for side in sides]
+    padded = np.pad(values, around, mode="symmetric" if outside == "mirror" else "constant")
+    expected = [
+        [
+            padded[row : row + sides[0], column : column + sides[1]].mean()
+            for column in range(shape[1])
+        ]
+        for row in range(shape[0])
+    ]
+    found = uncertainty.mean(values, sides, outside=outside)
+    # Running sums of up to 19 x 21 numbers of size 1 keep 1e-16 of each.
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
