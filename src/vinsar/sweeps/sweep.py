@@ -242,7 +242,12 @@ def cases(study: Study, name: str, *given: str) -> list[Case]:
     # What the first stages read changes slowest, so that few of their products are kept at a time.
     seen: list[dict[str, int]] = [{} for _ in sections]
     found, ranks = [], []
-    for index, (changes, case) in zip(np.ndindex(*shape), studies(study, name), strict=True):
+    # The last key slowest: cases that one of its values makes alike (no error, along any axis) and
+    # channels that others share come together, too.
+    every = sorted(
+        zip(np.ndindex(*shape), studies(study, name), strict=True), key=lambda one: one[0][::-1]
+    )
+    for index, (changes, case) in every:
         values = case.values(names) | {"realization": None}
         whole = _text(values)
         for realization in range(sweep.realizations):
