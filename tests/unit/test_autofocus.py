@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 
 import numpy as np
 import pytest
 
-from vinsar.kernels import contributions
+from vinsar.kernels import contributions, cycles
 from vinsar.processing import autofocus, focusing
 from vinsar.radar import trajectory, waveform
 from vinsar.simulation import echo
@@ -36,16 +37,17 @@ def test_contributions_are_the_matched_filter_of_each_position(system, request, 
     points = np.array([[0.3, 10.7, 0.0], [-0.8, 11.5, 0.1], [0.0, 30.0, 0.0]])
     slant = profiles["slant_range"].values
     ends = [antennas[name].values.reshape(-1, 3) for name in ("transmitter", "receiver")]
-    found = np.empty((len(ends[0]), len(points)), np.complex64)
-    contributions.fill(
+    given = (
         profiles["profile"].values.reshape(-1, slant.size),
         slant[0],
         (slant[-1] - slant[0]) / (slant.size - 1),
         2 * waveform.carrier(FREQUENCY) / LIGHT,
         *ends,
         np.ascontiguousarray(points.T),
-        found,
     )
+    found = np.empty((len(ends[0]), len(points)), np.complex64)
+    image, power = np.empty(len(points), np.complex64), np.empty(len(points), np.float32)
+    contributions.fill(*given, found, image, power)
     path = sum(np.linalg.norm(points - end[:, None], axis=-1) for end in ends)
     filters = np.exp(2j * np.pi * FREQUENCY * path[..., None] / LIGHT)
     direct = np.einsum(
@@ -55,6 +57,60 @@ def test_contributions_are_the_matched_filter_of_each_position(system, request, 
     error = np.abs(found - direct)[:, :2]
     assert np.sqrt((error**2).mean() / (np.abs(direct[:, :2]) ** 2).mean()) < 10 ** (-60 / 20)
     np.testing.assert_array_equal(found[:, 2], 0)
+    # Sums in single precision round by 6e-8 of their parts each.
+    size = np.abs(found).sum(axis=0)
+    assert (np.abs(image - found.sum(axis=0)) <= 6e-8 * len(found) * size).all()
+    np.testing.assert_allclose(power, (np.abs(found) ** 2).sum(axis=0), rtol=6e-8 * len(found))
+    alone = np.empty_like(image)
+    contributions.fill(*given, found[:0], alone, power)
+    np.testing.assert_array_equal(alone, image)
+
+
+def test_each_position_is_held_against_the_others_by_sector():
+    rng = np.random.default_rng(4)
+    parts = (rng.standard_normal((5, 9, 2)) @ [1, 1j]).astype(np.complex64)
+    reference = parts.sum(axis=0)
+    begins = np.array([0, 3, 7, 9])
+    found = np.empty((5, 3), complex)
+    contributions.agree(parts, reference, begins, found)
+    for sector, part in enumerate([slice(0, 3), slice(3, 7), slice(7, 9)]):
+        direct = (parts * (reference - parts).conj())[:, part].sum(axis=1)
+        # A dozen numbers of size 10 in single precision.
+        np.testing.assert_allclose(found[:, sector], direct, atol=1e-4)
+
+
+def test_phases_are_joined_whatever_their_weights(rail, scatterers):
+    """Weights that fall by six orders of magnitude along the rail: no antenna may be left out."""
+    samples = autofocus._Samples(seen_by(rail, scatterers, count=20), rail, EXTENT)
+    pairs = autofocus._Pairs(samples)
+    rng = np.random.default_rng(5)
+    phase = rng.uniform(-np.pi, np.pi, pairs.size)
+    products = np.exp(1j * (phase[pairs.first] - phase[pairs.second]))
+    place = (pairs.first + pairs.second) % samples.positions / samples.positions
+    found = pairs.synchronised(products, 10 ** (-6 * place))
+    turn = found * np.exp(-1j * phase)
+    # All phases agree, so the solution is exact but for rounding.
+    np.testing.assert_allclose(turn / turn[0], 1, atol=1e-6)
+
+
+def test_the_likeliest_path_is_the_best_of_all():
+    positions, states, most = 5, 4, 1
+    rng = np.random.default_rng(6)
+    gain = rng.standard_normal((positions - 1, 2 * most + 1))
+    cost = rng.standard_normal((positions, states))
+
+    def worth(path):
+        jumps = np.diff(path)
+        if np.abs(jumps).max() > most:
+            return -np.inf
+        return gain[np.arange(positions - 1), jumps + most].sum() - sum(
+            cost[place, state] for place, state in enumerate(path)
+        )
+
+    best = max(itertools.product(range(states), repeat=positions), key=worth)
+    path = np.empty(positions, np.int64)
+    cycles.likeliest(gain, cost, path)
+    np.testing.assert_array_equal(path, best)
 
 
 def test_displacements_are_added_to_both_ends(bistatic):

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from vinsar.kernels.compiling import kernel
+from vinsar.kernels import scratch
+from vinsar.kernels.compiling import kernel, part
 from vinsar.kernels.functions import phasor
 
-_HALF = 0.5
+_ZERO, _ONE, _HALF = np.float32(0), np.float32(1), np.float32(0.5)
+
+
+@part
+def _longer(
+    size: int, end: Any, middle: Any, share: Any,
+    rx: Any, ry: Any, rz: Any, inverse: Any, path: Any, offset: Any,
+) -> None:  # fmt: skip
+    """Add a share of how much longer the way is from one end than from the middle."""
+    dx, dy, dz = end[0] - middle[0], end[1] - middle[1], end[2] - middle[2]
+    square = np.float32(dx * dx + dy * dy + dz * dz)
+    x, y, z = np.float32(dx), np.float32(dy), np.float32(dz)
+    for i in range(size):
+        q = square * inverse[i] + x * rx[i] + y * ry[i] + z * rz[i]
+        offset[i] += share * path[i] * (q / (np.sqrt(_ONE + q) + _ONE))
 
 
 @kernel
@@ -20,6 +37,8 @@ def fill(
     receiver: np.ndarray,
     points: np.ndarray,
     out: np.ndarray,
+    image: np.ndarray,
+    power: np.ndarray,
 ) -> None:
     """Interpolate the profiles linearly at each point and turn them back by the path's phase.
 
@@ -36,58 +55,84 @@ def fill(
     points
         Points (3, point), m.
     out
-        Output (antenna, point), complex64; 0 where a point is out of the profile.
+        Output (antenna, point), complex64; 0 where a point is out of the profile. It may have no
+        rows, if the sums alone are wanted.
+    image, power
+        Outputs (point,), complex64 and float32: the sum over the antennas, and that of their
+        powers.
     """
-    samples, count = profile.shape[1], points.shape[1]
-    x, y, z = points
-    path, place = np.empty(count), np.empty(count)
-    cosine, sine = np.empty(count, np.float32), np.empty(count, np.float32)
-    # Short loops, each of one kind: all but the last vectorise.
-    for antenna in range(profile.shape[0]):
-        tx, ty, tz = transmitter[antenna]
-        rx, ry, rz = receiver[antenna]
-        for i in range(count):
-            a, b, c = x[i] - tx, y[i] - ty, z[i] - tz
-            path[i] = np.sqrt(a * a + b * b + c * c)
-        if tx != rx or ty != ry or tz != rz:
-            for i in range(count):
-                a, b, c = x[i] - rx, y[i] - ry, z[i] - rz
-                path[i] = _HALF * (path[i] + np.sqrt(a * a + b * b + c * c))
-        for i in range(count):
-            place[i] = (path[i] - first_range) / spacing
-            cycles = path[i] * cycles_per_metre
-            cosine[i], sine[i] = phasor(np.float32(cycles - np.floor(cycles + _HALF)))
-        line, row = profile[antenna], out[antenna]
-        for i in range(count):
-            index = int(np.floor(place[i]))
-            if index < 0 or index > samples - 2:
-                row[i] = 0
-                continue
-            rest = np.float32(place[i] - index)
-            near, far = line[index], line[index + 1]
-            real = near.real + rest * (far.real - near.real)
-            imag = near.imag + rest * (far.imag - near.imag)
-            row[i] = complex(real * cosine[i] - imag * sine[i], real * sine[i] + imag * cosine[i])
-
-
-@kernel
-def add(parts: np.ndarray, image: np.ndarray) -> float:
-    """Add the parts up over the positions, and return the sum of their powers.
-
-    Parameters
-    ----------
-    parts
-        What the positions contribute (position, point), complex64.
-    image
-        Their sum (point,), complex64, which begins at 0.
-    """
-    power = 0.0
-    for position in range(parts.shape[0]):
-        row = parts[position]
-        for i in range(image.size):
-            image[i] += row[i]
-            power += row[i].real * row[i].real + row[i].imag * row[i].imag
-    return power
+    per_step, per_metre = np.float32(1 / spacing), np.float32(cycles_per_metre)
+    antennas, count = profile.shape[0], points.shape[1]
+    last = np.int32(profile.shape[1] - 2)
+    middle = np.zeros(3)
+    for antenna in range(antennas):
+        for axis in range(3):
+            middle[axis] += (transmitter[antenna, axis] + receiver[antenna, axis]) / (2 * antennas)
+    rx, ry, rz = scratch.floats(), scratch.floats(), scratch.floats()
+    inverse, path = scratch.floats(), scratch.floats()
+    place, turn, base = scratch.floats(), scratch.floats(), scratch.integers()
+    offset, index, rest = scratch.floats(), scratch.integers(), scratch.floats()
+    cosine, sine = scratch.floats(), scratch.floats()
+    real, imag = scratch.floats(), scratch.floats()
+    total_real, total_imag, total = scratch.floats(), scratch.floats(), scratch.floats()
+    for begin in range(0, count, scratch.SIZE):
+        size = min(scratch.SIZE, count - begin)
+        block = slice(begin, begin + size)
+        for i in range(size):
+            x = points[0, begin + i] - middle[0]
+            y = points[1, begin + i] - middle[1]
+            z = points[2, begin + i] - middle[2]
+            square = x * x + y * y + z * z
+            way = np.sqrt(square)
+            rx[i], ry[i], rz[i] = -2 * x / square, -2 * y / square, -2 * z / square
+            inverse[i], path[i] = 1 / square, way
+            at = (way - first_range) / spacing
+            base[i] = np.int32(np.floor(at))
+            place[i] = at - np.floor(at)
+            cycles = way * cycles_per_metre
+            turn[i] = cycles - np.floor(cycles)
+            total_real[i], total_imag[i], total[i] = 0, 0, 0
+        for antenna in range(antennas):
+            start, stop = transmitter[antenna], receiver[antenna]
+            same = start[0] == stop[0] and start[1] == stop[1] and start[2] == stop[2]
+            for i in range(size):
+                offset[i] = 0
+            share = _ONE if same else _HALF
+            _longer(size, start, middle, share, rx, ry, rz, inverse, path, offset)
+            if not same:
+                _longer(size, stop, middle, share, rx, ry, rz, inverse, path, offset)
+            for i in range(size):
+                at = place[i] + offset[i] * per_step
+                whole = np.floor(at)
+                rest[i] = at - whole
+                index[i] = base[i] + np.int32(whole)
+            for i in range(size):
+                cycles = turn[i] + offset[i] * per_metre
+                c, s = phasor(cycles - np.floor(cycles + _HALF))
+                inside = _ONE if 0 <= index[i] <= last else _ZERO
+                cosine[i], sine[i] = inside * c, inside * s
+            line = profile[antenna]
+            for i in range(size):
+                # Unsigned, so that no negative index needs a look.
+                k = np.uint64(min(max(index[i], np.int32(0)), last))
+                near, far = line[k], line[k + np.uint64(1)]
+                a = near.real + rest[i] * (far.real - near.real)
+                b = near.imag + rest[i] * (far.imag - near.imag)
+                real[i], imag[i] = a, b
+            for i in range(size):
+                a, b = real[i], imag[i]
+                real[i] = a * cosine[i] - b * sine[i]
+                imag[i] = a * sine[i] + b * cosine[i]
+                total_real[i] += real[i]
+                total_imag[i] += imag[i]
+                total[i] += real[i] * real[i] + imag[i] * imag[i]
+            if out.shape[0]:
+                row = out[antenna, block]
+                for i in range(size):
+                    row[i] = complex(real[i], imag[i])
+        for i in range(size):
+            image[begin + i] = complex(total_real[i], total_imag[i])
+            power[begin + i] = total[i]
 
 
 @kernel
@@ -108,10 +153,20 @@ def agree(parts: np.ndarray, reference: np.ndarray, begins: np.ndarray, out: np.
     for position in range(parts.shape[0]):
         row = parts[position]
         for sector in range(out.shape[1]):
-            real, imag = np.float32(0), np.float32(0)
-            for i in range(begins[sector], begins[sector + 1]):
-                a, b = row[i].real, row[i].imag
-                c, d = reference[i].real, reference[i].imag
+            begin, end = begins[sector], begins[sector + 1]
+            # Sums side by side, so that none waits for another.
+            real, imag, more, other = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+            for i in range(begin, end - 1, 2):
+                a, b, c, d = row[i].real, row[i].imag, reference[i].real, reference[i].imag
                 real += a * (c - a) + b * (d - b)
                 imag += b * c - a * d
-            out[position, sector] = complex(real, imag)
+                a, b = row[i + 1].real, row[i + 1].imag
+                c, d = reference[i + 1].real, reference[i + 1].imag
+                more += a * (c - a) + b * (d - b)
+                other += b * c - a * d
+            if (end - begin) % 2:
+                a, b = row[end - 1].real, row[end - 1].imag
+                c, d = reference[end - 1].real, reference[end - 1].imag
+                real += a * (c - a) + b * (d - b)
+                imag += b * c - a * d
+            out[position, sector] = complex(real + more, imag + other)

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
@@ -63,6 +64,13 @@ _LEAST_POSITIONS = 16
 _PHASE_LAG, _SLOPE_LAG = 8, 3
 _COARSE_ROUNDS, _SLIP_ROUNDS = 3, 6
 
+# Steps to the eigenvector, and those by its phases that follow.
+_EIGENVECTOR_STEPS, _PHASE_STEPS = 20, 3
+
+# Share of the largest sum of weights that each antenna has at least.
+_LEAST_DISAGREEMENT = 1e-6
+_TINY = float(np.finfo(np.float32).tiny)
+
 # Standard deviation of a distance from the coherence, in units of that where it vanishes.
 _SPACING_STD = 0.05
 
@@ -95,6 +103,9 @@ _WORTH = 1.03
 # Sharpness (2 for speckle and noise) that tells of prominent points, and its gain and the focus
 # that they must show; their cells.
 _PROMINENT, _SHARPER, _LEAST_SHARP_FOCUS, _PROMINENT_CELLS = 4.0, 1.1, 0.4, 64
+
+# Displacement, in wavelengths, that changes no image.
+_LEAST_MOVE = 1e-4
 
 # What a curve must gain in sharpness over a line.
 _MUCH_SHARPER = 1.3
@@ -259,27 +270,30 @@ def _by_speckle(image: _Image) -> Motion:
     """Return the errors by what neighbouring positions see alike, and by the image's energy."""
     samples = image.samples
     channels, positions = samples.channels, samples.positions
-    error, coherence = _coarse(samples)
-    gap = _gap(samples, coherence)
-    if gap is not None:
-        return _nothing(channels, positions, gap)
     still: Floats = np.zeros((channels, positions, 3))
     start = still
-    before = best = image.energy_of(start)
+    before = best = image.recorded.energy
+    in_focus = samples.focus(before, still) >= _IN_FOCUS
+    apart = _reached(np.abs(samples.level_covariance(still)), samples).min() < _LEAST_COHERENCE
+    if apart or not in_focus:
+        error, coherence = _coarse(samples)
+        gap = _gap(samples, coherence)
+        if gap is not None:
+            return _nothing(channels, positions, gap)
     # Of all steps the focus after this one alone tells a wrong order of positions from a right one.
     # In focus as recorded, positions need no other start, nor the level ground that these assume.
-    others = samples.along_sight(error), _spaced(samples)
-    for other in others if samples.focus(before, still) < _IN_FOCUS else ():
-        energy = image.energy_of(other)
-        if energy > _PREFERENCE * best:
-            start, best = other, energy
+    if not in_focus:
+        for other in (samples.along_sight(error), _spaced(samples)):
+            energy = image.form(other).energy
+            if energy > _PREFERENCE * best:
+                start, best = other, energy
     result = image.refine(start)
-    focus = samples.focus(before, still), samples.focus(result.energy, result.displacement)
+    focus = samples.focus(before, still), samples.focus(result.formed.energy, result.displacement)
     if focus[1] < _LEAST_FOCUS:
         reason = f"the echoes of all positions agree to {focus[1]:.0%} only"
         return _nothing(channels, positions, reason, focus)
     found = _moved(samples, result.displacement, result.covariance, focus)
-    if result.energy < _WORTH * before:
+    if result.formed.energy < _WORTH * before:
         reason = f"the navigated positions focus to {focus[0]:.0%} already"
         none = np.zeros_like(found.range_correction)
         return replace(found, displacement=still, range_correction=none, reason=reason)
@@ -340,36 +354,52 @@ class _Samples:
         self.receiver = recorded["receiver"].values
         self.channels, self.positions, _ = self.transmitter.shape
         self.extent = extent
+        self.echo = echo["echo"].values
         self.frequency = echo["frequency"].values
         self.wavelength = waveform.wavelength(waveform.carrier(self.frequency))
         x, y = np.array(extent[:2]), np.array(extent[2:])
         near, far = trajectory.range_extent(recorded, x, y)
+        self.reach = max(near - _MARGIN_M, 0.0), far + _MARGIN_M
         each = self.frequency.size // _SUB_BANDS
-        bands = [slice(None), *(slice(k * each, (k + 1) * each) for k in range(_SUB_BANDS))]
-        self.profiles = []
-        for band in bands:
-            profiles = focusing.compress(
-                echo.isel(frequency=band),
-                near_range_m=max(near - _MARGIN_M, 0.0),
-                far_range_m=far + _MARGIN_M,
-                oversampling=_OVERSAMPLING,
-            )
-            slant = profiles["slant_range"].values
-            self.profiles.append(
-                (
-                    profiles["profile"].values.reshape(-1, slant.size),
-                    float(slant[0]),
-                    float(slant[-1] - slant[0]) / (slant.size - 1),
-                    2 * float(profiles["carrier_frequency"]) / SPEED_OF_LIGHT,
-                )
-            )
+        self.bands = [slice(k * each, (k + 1) * each) for k in range(_SUB_BANDS)]
+        self.whole = self.profiles(slice(None))
         self.step_hz = float(self.frequency[each] - self.frequency[0])
         self.cell = waveform.range_resolution(float(self.frequency[-1] - self.frequency[0]))
+        self.monostatic = np.array_equal(self.transmitter, self.receiver)
         self.center = (self.transmitter + self.receiver).mean(axis=(0, 1)) / 2
         self.middle = (extent[0] + extent[1]) / 2
         coarse = self.ranges(self.cell * self.frequency.size / each)
         self.line = self.on_ground(coarse, np.zeros(1))[:, 0]
         self.count = len(coarse) * _SUB_BANDS
+
+    def profiles(self, band: slice) -> tuple[Complexes, float, float, float]:
+        """Return the range profiles (antenna, range) of a band, as `kernels.contributions` does.
+
+        With them their first range and spacing, m, and the carrier's cycles for each metre.
+        """
+        frequency = self.frequency[band]
+        profiles, slant = focusing.compressed(
+            self.echo[..., band],
+            frequency,
+            near_range_m=self.reach[0],
+            far_range_m=self.reach[1],
+            window="rectangular",
+            oversampling=_OVERSAMPLING,
+            interpolation="linear",
+        )
+        spacing = float(slant[-1] - slant[0]) / (slant.size - 1)
+        cycles = 2 * waveform.carrier(frequency) / SPEED_OF_LIGHT
+        return profiles.reshape(-1, slant.size), float(slant[0]), spacing, cycles
+
+    @cached_property
+    def sub_bands(self) -> list[tuple[Complexes, float, float, float]]:
+        """The profiles of each sub-band."""
+        return [self.profiles(band) for band in self.bands]
+
+    @cached_property
+    def recorded_covariance(self) -> Complexes:
+        """The covariance along the middle line by the recorded positions (`_covariance`)."""
+        return _covariance(self, np.zeros_like(self.transmitter))
 
     def ranges(self, spacing: float) -> Floats:
         """Return cells of slant range from the centre along the middle line, m."""
@@ -394,26 +424,59 @@ class _Samples:
         ground = np.sqrt(range_m**2 - self.center[2] ** 2)
         return float((self.extent[1] - self.extent[0]) / ground)
 
-    def take(self, band: int, displacement: Floats, points: Floats) -> Complexes:
-        """Return what positions contribute to points (channel * position, point)."""
+    def take(
+        self,
+        profiles: tuple[Complexes, float, float, float],
+        displacement: Floats,
+        points: Floats,
+        *,
+        apart: bool = True,
+    ) -> tuple[Complexes, Complexes, float]:
+        """Return what positions contribute to points (channel, position, point).
+
+        With it go the images (channel, point) and the sum of the powers. Contributions that are not
+        wanted apart have no positions.
+        """
         from vinsar.kernels import contributions
 
-        out = np.empty((self.channels * self.positions, len(points)), np.complex64)
-        contributions.fill(
-            *self.profiles[band],
-            (self.transmitter + displacement).reshape(-1, 3),
-            (self.receiver + displacement).reshape(-1, 3),
-            np.ascontiguousarray(points.T),
-            out,
-        )
-        return out
+        count = self.positions if apart else 0
+        out = np.empty((self.channels, count, len(points)), np.complex64)
+        image = np.empty((self.channels, len(points)), np.complex64)
+        power = np.empty((self.channels, len(points)), np.float32)
+        columns = np.ascontiguousarray(points.T)
+        for channel in range(self.channels):
+            own = slice(channel * self.positions, (channel + 1) * self.positions)
+            contributions.fill(
+                profiles[0][own],
+                *profiles[1:],
+                self.transmitter[channel] + displacement[channel],
+                self.receiver[channel] + displacement[channel],
+                columns,
+                out[channel],
+                image[channel],
+                power[channel],
+            )
+        return out, image, float(power.sum(dtype=float))
+
+    def paths(self, displacement: Floats, points: Floats) -> Floats:
+        """Return the half paths (antenna, point) to points, m."""
+        total = np.zeros((self.channels * self.positions, len(points)))
+        for end in (self.transmitter, self.receiver):
+            if end is self.receiver and self.monostatic:
+                return 2 * total
+            place = (end + displacement).reshape(-1, 3)
+            squares = (np.subtract.outer(place[:, k], points[:, k]) ** 2 for k in range(3))
+            total += np.sqrt(sum(squares)) / 2
+        return total
 
     def gradient(self, displacement: Floats, points: Floats) -> Floats:
         """Return how the half path to points grows with a displacement (..., point, 3)."""
         total = np.zeros((*self.transmitter.shape[:2], len(points), 3))
         for end in (self.transmitter, self.receiver):
+            if end is self.receiver and self.monostatic:
+                return 2 * total
             ray = points - (end + displacement)[..., None, :]
-            total -= ray / np.linalg.norm(ray, axis=-1, keepdims=True) / 2
+            total -= ray / (2 * np.sqrt(np.einsum("...i,...i", ray, ray))[..., None])
         return total
 
     def sight(self) -> Floats:
@@ -427,24 +490,23 @@ class _Samples:
         size = (sight**2).sum(axis=-1, keepdims=True)
         return np.asarray(sight / size * range_error.reshape(*sight.shape[:2], 1))
 
-    def level_covariance(self, displacement: Floats) -> Complexes:
-        """Return the covariance (antenna, antenna) by a level scene, of unit power."""
+    def level_steering(self, displacement: Floats) -> Complexes:
+        """Return how antennas see the cells of a level scene of unit power (antenna, cell)."""
         middle = self.line[len(self.line) // 2]
         slant = float(np.linalg.norm(middle - self.center))
         width = self.width(slant)
         cells = max(2, int(np.ceil(2 * width / self.angle_cell())))
         sines = width * ((np.arange(cells) + 0.5) / cells - 0.5)
         arc = self.on_ground(np.array([slant]), sines)[0]
-        paths = []
-        for points in (arc, middle[None]):
-            legs = [
-                np.linalg.norm(points - (end + displacement)[..., None, :], axis=-1)
-                for end in (self.transmitter, self.receiver)
-            ]
-            paths.append((legs[0] + legs[1]) / 2)
-        phase = -4 * np.pi / self.wavelength * (paths[0] - paths[1]).reshape(-1, cells)
-        steering = np.exp(1j * phase)
-        return np.asarray(steering @ steering.conj().T / cells)
+        path = self.paths(displacement, np.concatenate([arc, middle[None]]))
+        cycles = -2 / self.wavelength * (path[:, :-1] - path[:, -1:])
+        phase = (2 * np.pi * (cycles - np.round(cycles))).astype(np.float32)
+        return np.asarray((np.cos(phase) + 1j * np.sin(phase)) / np.float32(np.sqrt(cells)))
+
+    def level_covariance(self, displacement: Floats) -> Complexes:
+        """Return the covariance (antenna, antenna) by a level scene, of unit power."""
+        steering = self.level_steering(displacement)
+        return np.asarray(steering @ steering.conj().T)
 
     def angle_cell(self) -> float:
         """Return the aperture's resolution in the sine of angle."""
@@ -453,9 +515,10 @@ class _Samples:
 
     def focus(self, energy: float, displacement: Floats) -> float:
         """Return the share of the full coherence that an image energy tells."""
-        size = np.abs(self.level_covariance(displacement)) ** 2
-        size = size.reshape(self.channels, self.positions, self.channels, self.positions)
-        own = np.mean([size[c, :, c].sum() for c in range(self.channels)]) / self.positions
+        steering = self.level_steering(displacement).reshape(self.channels, self.positions, -1)
+        # The squared size of a matrix's product with itself is the same in either order.
+        size = np.abs(steering.conj().transpose(0, 2, 1) @ steering) ** 2
+        own = size.sum(dtype=float) / (self.channels * self.positions)
         return float(np.clip((energy - 1) / (own - 1), 0, 1))
 
 
@@ -465,19 +528,10 @@ def _gap(samples: _Samples, measured: Floats) -> str | None:
     Navigated positions with errors seem farther apart than they are, and echoes may be weak: both
     must tell of the gap.
     """
-    nearest = np.zeros((2, samples.positions - 1))
     level = np.abs(samples.level_covariance(np.zeros_like(samples.transmitter)))
     # Of some ten pairs across a gap the largest coherence of noise stays below this, by far.
     measured = np.where(measured > np.sqrt(_BY_CHANCE / samples.count), measured, 0)
-    for row, size in zip(nearest, (level, measured), strict=True):
-        pairs = size.reshape(samples.channels, samples.positions, samples.channels, -1)
-        for channel in range(samples.channels):
-            for lag in range(1, _SLOPE_LAG + 1):
-                values = np.diagonal(pairs[channel, :, channel], lag)
-                for shift in range(lag):
-                    reached = row[shift : shift + values.size]
-                    np.maximum(reached, values, out=reached)
-    most = nearest.max(axis=0)
+    most = np.maximum(_reached(level, samples), _reached(measured, samples))
     weakest = int(most.argmin())
     if most[weakest] >= _LEAST_COHERENCE:
         return None
@@ -488,60 +542,145 @@ def _gap(samples: _Samples, measured: Floats) -> str | None:
     )
 
 
+def _reached(size: Floats, samples: _Samples) -> Floats:
+    """Return the largest coherence (position - 1,) across each step from a position to the next."""
+    reached = np.zeros(samples.positions - 1)
+    pairs = size.reshape(samples.channels, samples.positions, samples.channels, -1)
+    for channel in range(samples.channels):
+        for lag in range(1, _SLOPE_LAG + 1):
+            values = np.diagonal(pairs[channel, :, channel], lag)
+            for shift in range(lag):
+                across = reached[shift : shift + values.size]
+                np.maximum(across, values, out=across)
+    return reached
+
+
+class _Pairs:
+    """Pairs of antennas near each other, and the phases between them."""
+
+    def __init__(self, samples: _Samples) -> None:
+        place = np.tile(np.arange(samples.positions), samples.channels)
+        self.size = place.size
+        # With the channels of a position side by side, pairs lie along a matrix's diagonal.
+        self.order = place * samples.channels + np.arange(self.size) // samples.positions
+        lag = place - place[:, None]
+        later = self.order > self.order[:, None]
+        self.first, self.second = np.nonzero((lag <= _PHASE_LAG) & later)
+        self.lag = lag[self.first, self.second]
+        column, row = self.order[self.second], self.order[self.first]
+        self.reach = int(np.max(column - row))
+        self.beside = self.reach + row - column, column
+        self.samples = samples
+        self.carrier = np.array([2 * np.pi * band[3] for band in samples.sub_bands])
+
+    def turned(self, covariance: Complexes, by: Floats) -> Complexes:
+        """Return the covariance (sub-band, pair) once range errors (antenna,) are taken out."""
+        turn = np.exp(1j * self.carrier[:, None] * by).astype(np.complex64)
+        return np.asarray(covariance * (turn[:, self.first] * turn[:, self.second].conj()))
+
+    def synchronised(self, products: Complexes, weight: Floats) -> Complexes:
+        """Return the unit phasors (antenna,) whose products fit those of pairs best.
+
+        From the eigenvector of least disagreement, degrees less weights over degrees, by Gauss and
+        Newton. (That of the weights' largest eigenvalue lies about the positions of largest
+        weights, and leaves the phase of others to rounding.)
+        """
+        from scipy.linalg import cho_solve_banded
+
+        # In double precision: entries larger than their weights would leave it indefinite.
+        value = weight * np.exp(1j * np.angle(products).astype(float))
+        factor, degree = self.disagreement(weight, value)
+        vector = np.ones(self.size, complex)
+        for _ in range(_EIGENVECTOR_STEPS):
+            vector = cho_solve_banded((factor, False), degree * vector, check_finite=False)
+            vector /= np.abs(vector).max()
+        phase = np.angle(vector)[self.order]
+        for _ in range(_PHASE_STEPS):
+            phasor = np.exp(1j * phase)
+            rest = value * phasor[self.first].conj() * phasor[self.second]
+            agreed = np.maximum(rest.real, 0)
+            factor, _ = self.disagreement(agreed, agreed)
+            slope = self.by_antenna(rest.imag, -rest.imag)
+            move = cho_solve_banded((factor, False), slope, check_finite=False)[self.order]
+            phase += np.clip(move, -1, 1)
+        phasor = np.exp(1j * phase)
+        return np.asarray(phasor * np.exp(-1j * np.angle(phasor.mean())))
+
+    def disagreement(self, weight: Floats, value: Complexes | Floats) -> tuple[Complexes, Floats]:
+        """Return the factor of the matrix of degrees less values (pair,), and the degrees.
+
+        Both are ordered by `order`.
+        """
+        from scipy.linalg import cholesky_banded
+
+        degree = self.by_antenna(weight, weight)
+        # Antennas that nothing joins to others would leave it singular.
+        degree += _LEAST_DISAGREEMENT * degree.max() + _TINY
+        band = np.zeros((self.reach + 1, self.size), value.dtype)
+        band[self.reach] = degree * (1 + _LEAST_DISAGREEMENT)
+        band[self.beside] = -value
+        return cholesky_banded(band, overwrite_ab=True, check_finite=False), degree
+
+    def by_antenna(self, of_first: Floats, of_second: Floats) -> Floats:
+        """Return the sums (antenna,) over the pairs that each antenna is in, ordered by `order`."""
+        result = np.empty(self.size)
+        result[self.order] = np.bincount(self.first, of_first, minlength=self.size)
+        result[self.order] += np.bincount(self.second, of_second, minlength=self.size)
+        return result
+
+
 def _coarse(samples: _Samples) -> tuple[Floats, Floats]:
     """Return range errors (channel, position), m, true less navigated, but for a constant.
 
     With them, the coherence (antenna, antenna) of the positions that they leave.
     """
     shape = samples.channels, samples.positions
-    place = np.tile(np.arange(samples.positions), samples.channels)
-    lag = np.abs(place[:, None] - place)
-    size = place.size
-    carrier = np.array([2 * np.pi * band[3] for band in samples.profiles[1:]])
+    pairs = _Pairs(samples)
     period = SPEED_OF_LIGHT / (2 * samples.step_hz)
     cells = samples.count // _SUB_BANDS
-    error = np.zeros(size)
+    error = np.zeros(pairs.size)
     covariance: Complexes = np.empty(0, complex)
-
-    def shift(by: Floats) -> None:
-        nonlocal error, covariance
-        turn = np.exp(1j * carrier[:, None] * by)
-        covariance = covariance * (turn[:, :, None] * turn[:, None, :].conj())
-        error = error + by
-
-    for _ in range(_COARSE_ROUNDS):
+    for number in range(_COARSE_ROUNDS):
         displacement = samples.along_sight(error)
-        level = samples.level_covariance(displacement)
-        covariance = _covariance(samples, displacement) * np.exp(-1j * np.angle(level))
+        found = _covariance(samples, displacement) if number else samples.recorded_covariance
+        level = samples.level_covariance(displacement)[pairs.first, pairs.second]
+        covariance = found[:, pairs.first, pairs.second] * level.conj()
+        covariance /= np.abs(level) + np.finfo(np.float32).tiny
         slope = (covariance[1:] * covariance[:-1].conj()).mean(axis=0)
-        weight = np.where(lag <= _SLOPE_LAG, _weight(np.sqrt(np.abs(slope)), cells), 0)
-        delay = -np.angle(_synchronise(slope, weight)) * period / (2 * np.pi)
-        total = error + delay
-        shift(delay - period * np.round(total / period))
+        weight = np.where(pairs.lag <= _SLOPE_LAG, _weight(np.sqrt(np.abs(slope)), cells), 0)
+        delay = -np.angle(pairs.synchronised(slope, weight)) * period / (2 * np.pi)
+        delay -= period * np.round((error + delay) / period)
+        covariance, error = pairs.turned(covariance, delay), error + delay
         whole = covariance.mean(axis=0)
-        weight = np.where(lag <= _PHASE_LAG, _weight(np.abs(whole), samples.count), 0)
-        phase = np.angle(_synchronise(whole, weight)).reshape(shape)
+        weight = _weight(np.abs(whole), samples.count)
+        phase = np.angle(pairs.synchronised(whole, weight)).reshape(shape)
         phase = np.unwrap(phase, axis=1)
         turns = np.round(np.median(phase - phase[0], axis=1) / (2 * np.pi))
         phase -= 2 * np.pi * turns[:, None]
-        shift(-(phase - np.median(phase)).ravel() * samples.wavelength / (4 * np.pi))
+        by = -(phase - np.median(phase)).ravel() * samples.wavelength / (4 * np.pi)
+        covariance, error = pairs.turned(covariance, by), error + by
         error = error - error.mean()
     for _ in range(_SLIP_ROUNDS):
-        cycles = _slips(samples, covariance, error)
+        cycles = _slips(pairs, covariance, error)
         if not cycles.any():
             break
-        shift(cycles * samples.wavelength / 2)
-    return error.reshape(shape), np.abs(covariance.mean(axis=0))
+        by = cycles * samples.wavelength / 2
+        covariance, error = pairs.turned(covariance, by), error + by
+    coherence = np.eye(pairs.size)
+    coherence[pairs.first, pairs.second] = np.abs(covariance.mean(axis=0))
+    return error.reshape(shape), np.maximum(coherence, coherence.T)
 
 
 def _covariance(samples: _Samples, displacement: Floats) -> Complexes:
     """Return the sample covariance (sub-band, antenna, antenna) along the middle line."""
     result = []
-    for band in range(1, _SUB_BANDS + 1):
-        values = samples.take(band, displacement, samples.line)
-        values = values / np.sqrt((np.abs(values) ** 2).mean(axis=0))
-        values = values / np.sqrt((np.abs(values) ** 2).mean(axis=1, keepdims=True))
-        result.append(values @ values.conj().T / values.shape[1])
+    for band in samples.sub_bands:
+        values = samples.take(band, displacement, samples.line)[0]
+        values = values.reshape(-1, len(samples.line))
+        values /= np.sqrt((values.real**2 + values.imag**2).mean(axis=0))
+        power = (values.real**2 + values.imag**2).sum(axis=1, keepdims=True)
+        values /= np.sqrt(power)
+        result.append(values @ values.conj().T)
     return np.array(result)
 
 
@@ -554,7 +693,7 @@ def _spaced(samples: _Samples) -> Floats:
     and navigated positions with the prior's errors.
     """
     displacement = np.zeros_like(samples.transmitter)
-    covariance = _covariance(samples, displacement)
+    covariance = samples.recorded_covariance
     middle = samples.line[len(samples.line) // 2]
     width = samples.width(float(np.linalg.norm(middle - samples.center)))
     place = (samples.transmitter + samples.receiver)[..., 0] / 2
@@ -593,23 +732,7 @@ def _weight(coherence: Floats, looks: int) -> Floats:
     return np.asarray(square / (1 - square))
 
 
-def _synchronise(products: Complexes, weight: Floats, steps: int = 20) -> Complexes:
-    """Return the unit phasors whose products fit best: the leading eigenvector, then by turns."""
-    from scipy.linalg import eigh
-
-    matrix = weight * products / np.maximum(np.abs(products), np.finfo(np.float32).tiny)
-    np.fill_diagonal(matrix, 0)
-    last = len(matrix) - 1
-    vector = eigh(matrix, subset_by_index=(last, last))[1][:, 0]
-    for _ in range(steps):
-        vector = vector / np.maximum(np.abs(vector), np.finfo(float).tiny)
-        vector = matrix @ vector
-    vector = vector / np.maximum(np.abs(vector), np.finfo(float).tiny)
-    mean = vector.mean()
-    return np.asarray(vector * np.exp(-1j * np.angle(mean)))
-
-
-def _slips(samples: _Samples, covariance: Complexes, error: Floats) -> NDArray[np.integer]:
+def _slips(pairs: _Pairs, covariance: Complexes, error: Floats) -> NDArray[np.integer]:
     """Return whole cycles, common to the channels, by which range errors are more likely.
 
     The carrier's phase leaves half a wavelength open from one position to the next, and the slope
@@ -617,42 +740,40 @@ def _slips(samples: _Samples, covariance: Complexes, error: Floats) -> NDArray[n
     each position weighs the phases of neighbours in the sub-bands against errors larger than the
     others are.
     """
+    from vinsar.kernels.cycles import likeliest
+
+    samples = pairs.samples
     channels, positions = samples.channels, samples.positions
-    carrier = np.array([band[3] for band in samples.profiles[1:]])
-    turn = 2 * np.pi * carrier * samples.wavelength / 2
+    turn = pairs.carrier * samples.wavelength / 2
     jumps = np.arange(-_MOST_JUMP, _MOST_JUMP + 1)
     cycles = np.arange(-_MOST_SLIPS, _MOST_SLIPS + 1)
-    whole = covariance.mean(axis=0)
+    next_ = np.nonzero(pairs.lag == 1)[0]
+    beside = covariance[:, next_].conj()
+    square = np.clip(np.abs(beside.mean(axis=0)) ** 2 - 1 / samples.count, 0, 0.98)
+    fit = (beside.T @ np.exp(1j * turn[:, None] * jumps)).real
     gain = np.zeros((positions - 1, jumps.size))
-    before = np.arange(positions - 1)
-    for first in range(channels):
-        for second in range(channels):
-            i, j = first * positions + before + 1, second * positions + before
-            square = np.clip(np.abs(whole[i, j]) ** 2 - 1 / samples.count, 0, 0.98)
-            fit = np.einsum("kp,km->pm", covariance[:, i, j], np.exp(1j * turn[:, None] * jumps))
-            gain += (np.sqrt(square) / (1 - square))[:, None] * fit.real
+    worth = np.sqrt(square) / (1 - square)
+    np.add.at(gain, pairs.first[next_] % positions, worth[:, None] * fit)
     # Neighbouring pairs see the same speckle: the pairs of all channels count as half of them.
     gain *= samples.count / _SUB_BANDS / channels
     common = error.reshape(channels, positions).mean(axis=0)
     variance = (common**2).mean() + np.finfo(float).tiny
     cost = (common[:, None] + samples.wavelength / 2 * cycles) ** 2 / (2 * variance)
-    best = -cost[0]
-    chosen = []
-    for position in range(positions - 1):
-        candidates = np.full((jumps.size, cycles.size), -np.inf)
-        for row, jump in enumerate(jumps.tolist()):
-            to = slice(max(jump, 0), cycles.size + min(jump, 0))
-            come = slice(max(-jump, 0), cycles.size + min(-jump, 0))
-            candidates[row, to] = best[come] + gain[position, row]
-        chosen.append(candidates.argmax(axis=0))
-        best = candidates.max(axis=0) - cost[position + 1]
-    state = int(best.argmax())
-    path = np.empty(positions, int)
-    for position in range(positions - 1, -1, -1):
-        path[position] = cycles[state]
-        if position:
-            state -= jumps[chosen[position - 1][state]]
-    return np.tile(path, channels)
+    path = np.empty(positions, np.int64)
+    likeliest(gain, cost, path)
+    return np.tile(cycles[path], channels)
+
+
+@dataclass(frozen=True)
+class _Formed:
+    """An image (channel, point), its parts (channel, position, point) and its energy.
+
+    The energy is relative to that of incoherent positions. Parts may be left out.
+    """
+
+    parts: Complexes
+    image: Complexes
+    energy: float
 
 
 @dataclass(frozen=True)
@@ -662,7 +783,7 @@ class _State:
     displacement: Floats
     covariance: Floats
     prior: Floats
-    energy: float
+    formed: _Formed
 
 
 class _Image:
@@ -692,38 +813,31 @@ class _Image:
         along = np.linspace(-1, 1, samples.positions)
         self.trend = np.linalg.qr(np.stack([np.ones_like(along), along], axis=1))[0]
 
-    def form(self, displacement: Floats) -> tuple[Complexes, Complexes, float]:
-        """Return what positions contribute (channel, position, point), their image, its energy.
-
-        The energy is relative to that of incoherent positions.
-        """
-        from vinsar.kernels import contributions
-
-        samples = self.samples
-        parts = samples.take(0, displacement, self.points)
-        parts = parts.reshape(samples.channels, samples.positions, -1)
-        image = np.zeros((samples.channels, len(self.points)), np.complex64)
-        power = sum(
-            contributions.add(part, total) for part, total in zip(parts, image, strict=True)
+    def form(self, displacement: Floats, *, apart: bool = False) -> _Formed:
+        """Return the image, with the parts that the positions contribute if wanted."""
+        parts, image, power = self.samples.take(
+            self.samples.whole, displacement, self.points, apart=apart
         )
-        energy = float((image.real**2 + image.imag**2).sum()) / (power or 1.0)
-        return parts, image, energy
+        energy = float((image.real**2 + image.imag**2).sum(dtype=float))
+        return _Formed(parts, image, energy / (power or 1.0))
 
-    def correlate(self, displacement: Floats) -> tuple[Complexes, float]:
-        """Return each position's part of the image against the others' (channel, position, sector).
+    @cached_property
+    def recorded(self) -> _Formed:
+        """The image by the recorded positions, with its parts."""
+        return self.form(np.zeros_like(self.samples.transmitter), apart=True)
 
-        The energy of the image goes with it.
-        """
+    def correlate(self, formed: _Formed) -> Complexes:
+        """Return what parts agree with the rest of the image (channel, position, sector)."""
         from vinsar.kernels import contributions
 
-        parts, image, energy = self.form(displacement)
-        reference = image + self.other_channels(image)
+        parts = formed.parts
+        reference = formed.image + self.other_channels(formed.image)
         result: Complexes = np.empty((*parts.shape[:2], len(self.middles)), complex)
         for channel in range(len(parts)):
             contributions.agree(parts[channel], reference[channel], self.begins, result[channel])
         # The scale does not count; numbers near 1 keep clear of underflow.
         result /= np.abs(result).mean() or 1.0
-        return result, energy
+        return result
 
     def by_range_and_angle(self, image: Complexes) -> Complexes:
         """Return an image (channel, point) as (channel, range, angle)."""
@@ -754,15 +868,11 @@ class _Image:
             result[second] += turned.conj() * image[first]
         return result
 
-    def energy_of(self, displacement: Floats) -> float:
-        """Return the energy of the image relative to that of incoherent positions."""
-        return self.form(displacement)[2]
-
-    def step(self, displacement: Floats, prior: Floats) -> _State:
-        """Take one step of Gauss and Newton; the energy is that of the image before it."""
+    def step(self, formed: _Formed, displacement: Floats, prior: Floats) -> _State:
+        """Take one step of Gauss and Newton from an image; its energy is that of the result."""
         samples = self.samples
         channels, positions = samples.channels, samples.positions
-        found, energy = self.correlate(displacement)
+        found = self.correlate(formed)
         gradient = samples.gradient(displacement, self.middles)
         wave = 4 * np.pi / samples.wavelength
         # Amplitude and noise by sector: what is not in focus has little of the first.
@@ -789,7 +899,9 @@ class _Image:
         moved -= constant - constant.mean(axis=0)
         inverse = inverse.reshape(positions, channels, 3, channels, 3)
         own = np.stack([inverse[:, channel, :, channel] for channel in range(channels)])
-        return _State(moved, own, self.variances(moved, inverse, prior), energy)
+        return _State(
+            moved, own, self.variances(moved, inverse, prior), self.form(moved, apart=True)
+        )
 
     def variances(self, moved: Floats, inverse: Floats, prior: Floats) -> Floats:
         """Return the prior's standard deviations (mode, axis) that make the estimate likeliest."""
@@ -804,18 +916,17 @@ class _Image:
         return np.clip(result, _LEAST_STD * wavelength, _MOST_STD * wavelength)
 
     def refine(self, displacement: Floats) -> _State:
-        """Take steps until the energy gains no more; the energy is that of the result."""
+        """Take steps until the energy gains no more."""
         prior = np.full((self.samples.channels, 3), _FIRST_STD * self.samples.wavelength)
-        state = _State(displacement, np.empty(0), prior, 0.0)
+        formed = self.form(displacement, apart=True) if displacement.any() else self.recorded
         best = 0.0
         for _ in range(_MOST_STEPS):
-            state = self.step(state.displacement, state.prior)
-            if state.energy < best * (1 + _LEAST_GAIN):
+            best = formed.energy
+            state = self.step(formed, displacement, prior)
+            displacement, prior, formed = state.displacement, state.prior, state.formed
+            if formed.energy < best * (1 + _LEAST_GAIN):
                 break
-            best = state.energy
-        return _State(
-            state.displacement, state.covariance, state.prior, self.energy_of(state.displacement)
-        )
+        return state
 
 
 def _modes(channels: int) -> Floats:
@@ -860,7 +971,12 @@ class _Sharpest:
         samples = self.samples
         still: Floats = np.zeros_like(samples.transmitter)
         starts = [still, *self.smoothed()]
-        sharpness = np.array([self.sharpness_of(start) for start in starts])
+        formed = [self.sharpness(self.image.recorded.image)]
+        for start in starts[1:]:
+            # Positions on a line are where they are recorded to be.
+            moved = np.abs(start).max() > _LEAST_MOVE * samples.wavelength
+            formed.append(self.sharpness_of(start) if moved else formed[0])
+        sharpness = np.array(formed)
         if sharpness.max() < _PROMINENT:
             return found
         displacement, best = still.copy(), np.zeros(samples.channels)
@@ -882,13 +998,13 @@ class _Sharpest:
             return found
         displacement = self.registered(displacement, (taken[..., 1:] ** 2).mean(axis=(1, 2)))
         refined = self.image.refine(displacement)
-        recorded = samples.focus(self.image.energy_of(still), still)
-        focus = recorded, samples.focus(refined.energy, refined.displacement)
+        recorded = samples.focus(self.image.recorded.energy, still)
+        focus = recorded, samples.focus(refined.formed.energy, refined.displacement)
         if focus[1] > _LEAST_FOCUS and (
             self.sharpness_of(refined.displacement).mean() * _PREFERENCE > best.mean()
         ):
             return _moved(samples, refined.displacement, refined.covariance, focus)
-        focus = recorded, samples.focus(self.image.energy_of(displacement), displacement)
+        focus = recorded, samples.focus(self.image.form(displacement).energy, displacement)
         # Echoes from outside the image lower the focus, but a path that shakes leaves next to none.
         if focus[1] < _LEAST_SHARP_FOCUS:
             return found
@@ -925,7 +1041,7 @@ class _Sharpest:
         most = int(_SIGNIFICANT * turn / spacing * _OVERSAMPLING)
         if not most:
             return displacement
-        grid = self.image.by_range_and_angle(self.image.form(displacement)[1])
+        grid = self.image.by_range_and_angle(self.image.form(displacement).image)
         # Zeros beside the image keep its edges apart, those beside the spectrum interpolate.
         spectra = np.fft.fft(grid, 2 * angles)
         cross = np.fft.fftshift(spectra * spectra[:1].conj(), axes=-1)
@@ -943,7 +1059,7 @@ class _Sharpest:
 
     def sharpness_of(self, displacement: Floats) -> Floats:
         """Return the sharpness (channel,) of the image."""
-        return self.sharpness(self.image.form(displacement)[1])
+        return self.sharpness(self.image.form(displacement).image)
 
     def sharpness(self, image: Complexes) -> Floats:
         """Return the sharpness (channel,) of an image, 2 for speckle and noise."""
@@ -958,36 +1074,36 @@ class _Sharpest:
         keep = 1 / ((_SMOOTH_STD * self.samples.wavelength) ** 2 + left)
         moves = np.zeros((len(start), max(_MOVES), 3))
         displacement, covariance = start, np.zeros((*start.shape, 3))
-        parts, image, _ = self.image.form(start)
-        reached = self.sharpness(image)
+        formed = self.image.form(start, apart=True)
+        reached = self.sharpness(formed.image)
         for count in _MOVES:
             before = reached
             for _ in range(_MOST_SHARPER):
-                moved, spread = self.step(parts, image, displacement, moves[:, :count], keep)
+                moved, spread = self.step(formed, displacement, moves[:, :count], keep)
                 for share in _SHARES:
                     taken = moves[:, :count] + share * (moved - moves[:, :count])
                     candidate = start + np.einsum("lk,cki->cli", self.basis[:, :count], taken)
-                    trial, image_there, _ = self.image.form(candidate)
-                    sharpness = self.sharpness(image_there)
+                    trial = self.image.form(candidate, apart=True)
+                    sharpness = self.sharpness(trial.image)
                     sharper = sharpness.mean() > (1 + _GOES_ON) * reached.mean()
                     if sharper:
                         break
                 if not sharper:
                     break
                 moves[:, :count], covariance = taken, spread
-                displacement, reached, parts, image = candidate, sharpness, trial, image_there
+                displacement, reached, formed = candidate, sharpness, trial
             if reached.mean() < (1 + _GOES_FARTHER) * before.mean():
                 break
         return displacement, covariance, reached
 
     def step(
-        self, parts: Complexes, image: Complexes, displacement: Floats, moves: Floats, keep: Floats
+        self, formed: _Formed, displacement: Floats, moves: Floats, keep: Floats
     ) -> tuple[Floats, Floats]:
         """Take a step of Gauss and Newton: the moves (channel, polynomial, axis) after it.
 
         With them goes the covariance (channel, position, axis, axis) of the displacements.
         """
-        samples = self.samples
+        samples, image = self.samples, formed.image
         count = moves.shape[1]
         basis, free = self.basis[:, :count], self.free[:count]
         wave = 4 * np.pi / samples.wavelength
@@ -996,7 +1112,7 @@ class _Sharpest:
             power = np.abs(image[channel]) ** 2
             chosen = np.argpartition(power, -_PROMINENT_CELLS)[-_PROMINENT_CELLS:]
             reference = image[channel, chosen] * power[chosen] / (power[chosen] ** 2).sum()
-            found = parts[channel][:, chosen] * reference.conj()
+            found = formed.parts[channel][:, chosen] * reference.conj()
             gradient = samples.gradient(displacement, self.image.points[chosen])[channel]
             size = np.abs(found)
             # The score's variance over the information: what a phase's weight has too much.

@@ -152,9 +152,51 @@ def compress(
     ValueError
         If the ranges do not rise, or span more than the unambiguous range.
     """
+    profile, slant_range = compressed(
+        echo["echo"].values,
+        echo["frequency"].values,
+        near_range_m=near_range_m,
+        far_range_m=far_range_m,
+        window=window,
+        oversampling=oversampling,
+        interpolation=interpolation,
+    )
+    carrier = waveform.carrier(echo["frequency"].values)
+    result = variables.dataset(
+        "profiles",
+        {"profile": profile, "carrier_frequency": carrier},
+        {"channel": echo["channel"].values, "slant_range": slant_range},
+    )
+    result["profile"].attrs["interpolation"] = interpolation
+    return result
+
+
+def compressed(
+    samples: NDArray[np.complexfloating],
+    frequency: NDArray[np.floating],
+    *,
+    near_range_m: float,
+    far_range_m: float,
+    window: waveform.WindowName,
+    oversampling: int,
+    interpolation: Interpolation,
+) -> tuple[NDArray[np.complexfloating], NDArray[np.floating]]:
+    """Return what `compress` does, as arrays: profiles and slant ranges.
+
+    Parameters
+    ----------
+    samples, frequency
+        The echo (channel, position, frequency) and its frequencies, Hz.
+    near_range_m, far_range_m, window, oversampling, interpolation
+        As for `compress`, which says what is refused.
+
+    Returns
+    -------
+    tuple of ndarray
+        Profiles (channel, position, slant range), complex64, and the slant ranges, m.
+    """
     from scipy import fft
 
-    frequency = echo["frequency"].values
     count = frequency.size
     step = float(frequency[-1] - frequency[0]) / (count - 1)
     unambiguous = waveform.unambiguous_range(step)
@@ -175,7 +217,6 @@ def compress(
     cells = np.arange(first, int(np.ceil(far_range_m / spacing)) + 3)
     # The transform's phase runs from the first frequency; the carrier is the band's middle.
     turn = np.exp(-2j * np.pi * ((count - 1) / 2 * cells / length % 1)).astype(np.complex64)
-    samples = echo["echo"].values
     channels, positions = samples.shape[:2]
     profile = np.empty((channels, positions, cells.size), np.complex64)
 
@@ -194,13 +235,7 @@ def compress(
             for begin in range(0, positions, _POSITIONS_PER_BLOCK)
         ),
     )
-    result = variables.dataset(
-        "profiles",
-        {"profile": profile, "carrier_frequency": waveform.carrier(frequency)},
-        {"channel": echo["channel"].values, "slant_range": spacing * cells},
-    )
-    result["profile"].attrs["interpolation"] = interpolation
-    return result
+    return profile, spacing * cells
 
 
 def backproject(
