@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import time
+from pathlib import Path
+
+# Copies of the sources, wherever tests put them, share what is compiled. Numba asks once.
+os.environ.setdefault(
+    "NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / "src/vinsar/kernels/__pycache__")
+)
 
 import numpy as np
 import psutil

@@ -522,6 +522,11 @@ def test_compiled_kernels_are_kept_wherever_something_can_be_written(tmp_path, w
         environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
     hits = [int(python(HITS, **environment)) for _ in range(2)]
     assert hits == [0, 0 if writable == "nothing" else 1]
+    if writable == "variable":
+        # A copy elsewhere, of another time, has the same machine code.
+        shutil.copytree(package, tmp_path / "other" / "vinsar", copy_function=shutil.copyfile)
+        environment["PYTHONPATH"] = str(tmp_path / "other")
+        assert int(python(HITS, **environment)) == 1
 
 
 PROBE = """

@@ -24,10 +24,13 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
+_HOME = Path(__file__).parent
+
+
 def _digest() -> str:
     """Return the digest of whatever the machine code of a kernel depends on."""
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__}".encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(_HOME.glob("*.py")):
         content = source.read_bytes()
         digest.update(f" {source.name} {len(content)} ".encode() + content)
     return digest.hexdigest()
@@ -42,16 +45,19 @@ class _Cache(FunctionCache):
 
     Numba itself asks only for the source of the kernel, its processor and its own version, so that
     a kernel would keep the old code of an edited helper. What cannot be read, such as a file that
-    a full disk has cut short, is compiled again.
+    a full disk has cut short, is compiled again. In NUMBA_CACHE_DIR all copies of the same sources
+    share their machine code, wherever they lie and whenever they were written.
     """
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
         locator = self._impl.locator
-        self._cache_path = str(Path(locator.get_cache_path()) / _FOLDER)
-        self._cache_file = IndexDataCacheFile(
-            self._cache_path, self._impl.filename_base, locator.get_source_stamp()
-        )
+        place, stamp = locator.get_cache_path(), locator.get_source_stamp()
+        if Path(function.__code__.co_filename).parent == _HOME:
+            # The folder's name tells all that the stamp would.
+            place, stamp = numba.config.CACHE_DIR or place, _FOLDER
+        self._cache_path = str(Path(place) / _FOLDER)
+        self._cache_file = IndexDataCacheFile(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled kernel, or None if there is none that can be read."""
@@ -68,7 +74,8 @@ class _Cache(FunctionCache):
         folder = Path(self._cache_path)
         try:
             if not folder.is_dir():
-                for older in folder.parent.glob(f"{_FAMILY}*"):
+                # Where several copies of the sources may share, the others' stays.
+                for older in () if numba.config.CACHE_DIR else folder.parent.glob(f"{_FAMILY}*"):
                     shutil.rmtree(older, ignore_errors=True)
                 folder.mkdir(parents=True, exist_ok=True)
             super().save_overload(sig, data)

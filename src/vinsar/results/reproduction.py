@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Rules whose results tell how long jobs took, and so are never the same bytes.
 _TIMED = frozenset({"report"})
+# Where kernels are kept, compiled: the same sources elsewhere need not be compiled again.
+_COMPILED = Path(__file__).parents[1] / "kernels/__pycache__"
 
 
 @dataclass(frozen=True)
@@ -158,15 +160,18 @@ def _check_out(commit: str, place: Path) -> None:
 
 def _run(place: Path, targets: list[str], configuration: Sequence[str | Path], cores: int) -> None:
     files = [str(Path(path).absolute()) for path in configuration]
+    # As ./run starts it; the oldest commits have no such file.
+    start = ["-P", "workflow/start.py"]
     command = [
-        *(sys.executable, "-m", "snakemake", "--cores", str(cores)),
+        *(sys.executable, *(start if (place / start[1]).exists() else ["-m", "snakemake"])),
+        *("--cores", str(cores)),
         *(["--configfile", *files] if files else []),
         *("--", *targets),
     ]
     done = subprocess.run(  # noqa: S603
         command,
         cwd=place,
-        env=os.environ | {"PYTHONPATH": str(place / "src")},
+        env={"NUMBA_CACHE_DIR": str(_COMPILED)} | os.environ | {"PYTHONPATH": str(place / "src")},
         stdout=sys.stderr,
         check=False,
     )
