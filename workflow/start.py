@@ -1,18 +1,24 @@
 """Start Snakemake for ./run: check what it is given before, and what it has left afterwards.
 
-Snakemake is started in this process, with three of its habits changed: it runs no code that stands
-in a YAML file, it quotes the path of Python, and it is told which results do not hold.
+Snakemake is started in this process, with four of its habits changed: it runs no code that stands
+in a YAML file, it quotes the path of Python, its jobs fork from a process that has loaded the
+library, and it is told which results do not hold.
 """
 
 import functools
+import hashlib
+import multiprocessing.connection
 import os
 import re
 import subprocess
 import sys
+import threading
+import types
 from pathlib import Path
 
 import yte
 from snakemake import cli
+from snakemake.benchmark import benchmarked
 from snakemake.resources import Resource
 from snakemake.script import PythonScript
 from snakemake.workflow import Workflow
@@ -26,6 +32,12 @@ ROUND = "VINSAR_ROUND"
 ENDS_OF_FILES = (".yaml", ".yml", ".json")
 CONFIGFILE = ("--configfile", "--configfiles")
 CONFIG = ("--config", "-C")
+# What most jobs load, with the modules that xarray and Matplotlib load on their first use.
+LOADED = [
+    "snakemake.cli", "yte", "vinsar.figures", "vinsar.paper.claims", "vinsar.results.lineage",
+    "vinsar.study.pipeline", "vinsar.sweeps.sweep", "netCDF4", "dask.array", "distributed",
+    "matplotlib.backends.backend_agg", "scipy.optimize", "scipy.signal", "numba",
+]  # fmt: skip
 
 
 def main(arguments):
@@ -41,6 +53,8 @@ def main(arguments):
     if not options.dryrun:
         refuse_read_only(".snakemake", results.FOLDER)
     quote_interpreter()
+    if not options.dryrun:
+        fork_jobs()
     workflows = follow_workflows()
     done = cli.args_to_api(options, parser)
     for workflow in workflows:
@@ -116,6 +130,59 @@ def quote_interpreter():
         return execute(self, command.replace("{py_exec}", "{py_exec:q}"), **options)
 
     PythonScript._execute_cmd = quoting
+
+
+def fork_jobs():
+    """Let jobs fork from a process that has loaded what they need: most work takes less time.
+
+    Its linear algebra has one thread, which cannot be changed later: stages of several threads
+    share their work out themselves.
+    """
+    execute = PythonScript._execute_cmd
+    loaded = digests_of_library()
+    forks = multiprocessing.get_context("forkserver")
+    forks.set_forkserver_preload(LOADED)
+    os.environ.update({f"{library}_NUM_THREADS": "1" for library in ("OMP", "MKL", "OPENBLAS")})
+    turn = threading.Lock()
+
+    @functools.wraps(execute)
+    def forking(self, command, *, fname=None, **options):
+        elsewhere = fname is None or self.container_img or self.conda_env or self.env_modules
+        if elsewhere or digests_of_library() != loaded:
+            return execute(self, command, fname=fname, **options)
+        job = forks.Process(target=run_script, args=(fname, self.resources.get("tmpdir"), loaded))
+        # One at a time: each start asks whether the others have ended, too.
+        with turn:
+            job.start()
+        with benchmarked(job.pid, self.bench_record):
+            multiprocessing.connection.wait([job.sentinel])
+        with turn:
+            job.join()
+        if job.exitcode:
+            raise subprocess.CalledProcessError(job.exitcode, [sys.executable, fname])
+        return None
+
+    PythonScript._execute_cmd = forking
+
+
+def digests_of_library():
+    """Return the digest of each file of the library, by the path that jobs know it by."""
+    library = Path(results.__file__).parents[1]
+    return {
+        os.path.relpath(path): hashlib.sha256(path.read_bytes()).digest()
+        for path in library.rglob("*.py")
+    }
+
+
+def run_script(path, temporary, loaded):
+    """Run a script as Python would, in a process that has loaded some of it."""
+    if temporary:
+        os.environ.update(dict.fromkeys(("TMPDIR", "TMP", "TEMPDIR", "TEMP"), temporary))
+    sys.argv = [path]
+    main = types.ModuleType("__main__")
+    main.__file__, main.loaded = path, loaded
+    sys.modules["__main__"] = sys.modules["__mp_main__"] = main
+    exec(compile(Path(path).read_bytes(), path, "exec"), vars(main))  # noqa: S102
 
 
 def refuse_unquotable():

@@ -67,6 +67,7 @@ def test_a_command_of_the_pages_is_taken(start, place, monkeypatch, command):
     monkeypatch.setattr(start.cli, "args_to_api", lambda options, _: taken.append(options))
     monkeypatch.setattr(start, "suit_cluster", lambda _: None)
     monkeypatch.setattr(start, "quote_interpreter", lambda: None)
+    monkeypatch.setattr(start, "fork_jobs", lambda: None)
     monkeypatch.setattr(start, "follow_workflows", list)
     start.main(arguments)
     (options,) = taken

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import netCDF4
 import pytest
 import yte
+from snakemake.utils import format as formatted
 
 ROOT = Path(__file__).parents[2]
 
@@ -183,10 +185,47 @@ def test_an_edit_of_the_code_during_a_job_leaves_no_result_of_it(copy):
     assert not (copy.results / "trajectory.nc").exists()
 
 
-@pytest.mark.parametrize("name", ["my study", "it's", "a{b}c", 'OneDrive - "X" $HOME'])
-def test_it_runs_in_a_folder_of_any_name(new_checkout, tmp_path, name):
+TELL = """
+import psutil
+with open("started.txt", "a") as told:
+    told.write(f"{snakemake.rule} {' '.join(psutil.Process().parent().cmdline())}\\n")
+with open("src/vinsar/report/content.py", "a") as library:
+    library.write("# edited\\n")
+"""
+
+
+def test_jobs_fork_until_the_library_is_edited(copy):
+    script = copy.folder / "workflow/scripts/stage.py"
+    script.write_text(script.read_text() + TELL)
+    # The second is made from the first.
+    done = copy.snakemake("true_trajectory")
+    assert done.returncode == 0, done.stderr
+    first, second = (copy.folder / "started.txt").read_text().splitlines()
+    assert first.startswith("trajectory ")
+    assert second.startswith("true_trajectory ")
+    assert "multiprocessing.forkserver" in first
+    assert "multiprocessing.forkserver" not in second
+
+
+def test_the_path_of_python_is_quoted(start, monkeypatch):
+    told = []
+    monkeypatch.setattr(
+        start.PythonScript,
+        "_execute_cmd",
+        lambda _, *command, **given: told.append((command, given)),
+    )
+    start.quote_interpreter()
+    python, script = """/Jane's "study"/$HOME/python""", "a b.py"
+    start.PythonScript._execute_cmd(None, "{py_exec} {fname:q}", py_exec=python, fname=script)
+    ((command,), given) = told[0]
+    assert shlex.split(formatted(command, **given)) == [python, script]
+
+
+def test_it_runs_in_a_folder_of_any_name(new_checkout, tmp_path):
     place = new_checkout()
-    moved = place.folder.rename(tmp_path / name)
+    home = tmp_path / "my study/it's/a{b}c"
+    home.mkdir(parents=True)
+    moved = place.folder.rename(home / 'OneDrive - "X" $HOME')
     # Snakemake starts each job by the path of its Python.
     venv = moved / "venv"
     venv.symlink_to(sys.prefix)

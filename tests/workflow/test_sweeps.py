@@ -53,7 +53,7 @@ class Study:
         """Start as from a terminal: with a process group of its own, and Ctrl-C not ignored."""
         with (self.folder / "out.txt").open("wb") as out:
             return subprocess.Popen(
-                [*before, sys.executable, "-m", "snakemake", "--configfile", "tiny.yaml",
+                [*before, sys.executable, "-P", "workflow/start.py", "--configfile", "tiny.yaml",
                  "sweep.yaml", "--nocolor", "--", TARGET],
                 cwd=self.folder,
                 env=os.environ | {"PYTHONPATH": str(self.folder / "src")} | environment,

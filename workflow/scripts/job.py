@@ -18,8 +18,11 @@ def digests(snakemake):
 
 # Before the library is imported: what runs is what was read here, or a digest differs afterwards.
 # Worker processes import this file, too, but make no results.
-_rule = getattr(sys.modules["__main__"], "snakemake", None)
+_main = sys.modules["__main__"]
+_rule = getattr(_main, "snakemake", None)
 CODE = digests(_rule) if _rule else {}
+# Of a process that forked with the library loaded: what was read then.
+CODE |= {path: told for path, told in getattr(_main, "loaded", {}).items() if path in CODE}
 
 import dask  # noqa: E402
 import psutil  # noqa: E402
