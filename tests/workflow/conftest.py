@@ -1,5 +1,6 @@
 """A copy of the repository with a tiny study, run once for all tests of the workflow."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -78,10 +79,19 @@ class Checkout:
 @pytest.fixture(scope="session")
 def checkout(tmp_path_factory):
     """A checkout whose study has been run once; tests leave it as they found it."""
-    made = Checkout.new(tmp_path_factory.mktemp("checkout"))
-    done = made.snakemake()
-    assert done.returncode == 0, done.stdout + done.stderr
-    return made
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        # The folder that all workers share: whichever comes first runs the study.
+        folder = folder.parent
+    finished = Checkout(folder / "finished")
+    with (folder / "finished.lock").open("w") as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        if not finished.folder.exists():
+            made = Checkout.new(tmp_path_factory.mktemp("checkout"))
+            done = made.snakemake()
+            assert done.returncode == 0, done.stdout + done.stderr
+            made.folder.rename(finished.folder)
+    return finished.copy(tmp_path_factory.mktemp("copies") / "checkout")
 
 
 @pytest.fixture(scope="session")
