@@ -185,9 +185,17 @@ def sheet(usual):
 
 @pytest.fixture(scope="session")
 def drawn_texts():
-    """Return every text that reaches the paper, with its box in pixels."""
+    """Return every text that reaches the paper, with its box in pixels.
+
+    A figure is laid out once, which takes most of the time: nobody changes it afterwards.
+    """
 
     def drawn(figure):
+        if not hasattr(figure, "texts_on_paper"):
+            figure.texts_on_paper = laid_out(figure)
+        return figure.texts_on_paper
+
+    def laid_out(figure):
         texts = []
         original = Text.draw
 
