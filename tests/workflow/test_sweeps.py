@@ -30,6 +30,8 @@ sweeps:
 dask: {scheduler: processes, address: null}
 """
 CASES = 80
+# For machines on which much else runs.
+PATIENCE = 300
 
 
 class Study:
@@ -64,7 +66,7 @@ class Study:
             )  # fmt: skip
 
     def run(self, *before, **environment):
-        code = self.start(*before, **environment).wait(timeout=120)
+        code = self.start(*before, **environment).wait(timeout=PATIENCE)
         return code, self.said()
 
     def said(self):
@@ -77,7 +79,7 @@ class Study:
         return [one for one in psutil.process_iter() if str(self.folder) in where(one)]
 
     def wait_for_blocks(self, process, count):
-        until = time.monotonic() + 60
+        until = time.monotonic() + PATIENCE
         while not self.checkpoint.exists() or self.checkpoint.read_bytes().count(b'"code"') < count:
             assert process.poll() is None, self.said()
             assert time.monotonic() < until, self.said()
