@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vinsar.figures.drawing import declaration, style, sweeps
 from vinsar.foundations import variables
-from vinsar.radar import motion, trajectory
+from vinsar.radar import motion, trajectory, waveform
 from vinsar.simulation import scene
 
 if TYPE_CHECKING:
@@ -33,8 +34,15 @@ _LOOKS = {
     "exact": sweeps.Look("true speed", style.BLUE, "-", "o"),
     "sensor": sweeps.Look("speed sensor", style.INK, style.DASH_DOTTED, "^"),
 }
-_HEIGHT_MM = 104.0
-_BOTTOM, _TALL, _LOW, _HIGH = 25.0, 72.0, 32.0, 65.0
+_TWO_SCANS = (style.DASHED, "D"), (style.DASH_DOTTED, "v")
+_HEIGHT_MM = 108.0
+_BOTTOM, _TALL, _LOW, _HIGH = 29.0, 72.0, 32.0, 69.0
+# Heights of (d) and, above its title and the x axis of (e), of (e).
+_SENSOR_MM, _TOLD_MM = 33.0, 25.0
+# Share of the power that the bounds take as incoherent: relief and sidelobes of range.
+_INCOHERENT = 1 / 20
+# Speeds of which the bounds are taken.
+_BOUNDS = 6
 _LEFTS = (10.0, 50.0, 94.0, 141.0)
 _WIDTHS = (27.0, 32.0, 32.0, 36.0)
 
@@ -46,7 +54,8 @@ def draw(products: Products, study: Study) -> Figure:
     Parameters
     ----------
     products
-        ``sweeps/speed``, ``sweeps/speed_error``, ``sweeps/echoes``, ``terrain`` and ``truth``.
+        ``sweeps/speed``, ``sweeps/speed_error``, ``sweeps/echoes``, ``sweeps/next_scan``,
+        ``terrain`` and ``truth``.
     study
         The configuration.
 
@@ -87,14 +96,44 @@ def draw(products: Products, study: Study) -> Figure:
         if number == 0:
             upper.set_ylabel("amplitude (1)")
             lower.set_ylabel("height error, std (cm)")
-    axes = style.place(figure, _LEFTS[3], _BOTTOM, _WIDTHS[3], _TALL)
-    keys = _sensor(axes, error, products, study)
-    keys += _echoes(axes, variables.swept(products["sweeps/echoes"], _ERROR).sortby(_ERROR), study)
+    axes = style.place(figure, _LEFTS[3], _BOTTOM, _WIDTHS[3], _SENSOR_MM)
+    keys, tolerated = _sensor(axes, error, products, study)
+    looks = _looks(study, durations)
+    echoes = variables.swept(products["sweeps/echoes"], _ERROR).sortby(_ERROR)
+    both = variables.swept(products["sweeps/next_scan"], _DURATION, _ERROR).sortby(_ERROR)
+    _corrected(axes, echoes, looks[0])
+    for duration, look in zip(durations, looks[1:], strict=False):
+        if duration in both[_DURATION].values:
+            _corrected(axes, both.sel({_DURATION: duration}), look)
     _level(axes, relief)
     sweeps.log_y(axes, limits)
-    sweeps.legend(figure, [*handles, *_keys()], _LEFTS[0], 2.0, 3)
+    upper = style.place(figure, _LEFTS[3], _BOTTOM + _TALL - _TOLD_MM, _WIDTHS[3], _TOLD_MM)
+    _told(upper, speed[_SPEED].values, study, durations, looks, tolerated)
+    handles += [*_keys(), *(_key(look) for look in looks)]
+    sweeps.legend(figure, handles, _LEFTS[0], 2.0, 3)
     sweeps.legend(figure, keys, _LEFTS[3] - 13.0, 2.0, 1)
     return figure
+
+
+def _looks(study: Study, durations: list[float]) -> list[sweeps.Look]:
+    """Return how the echoes' corrections look: of one scan, then of two by duration."""
+    own = _time(trajectory.scan_duration(study.radar, study.vehicle))
+    return [
+        sweeps.Look(f"(d, e) echoes of a scan, {own}", style.ORANGE, "-", "s"),
+        *(
+            sweeps.Look(f"(d, e) and the next, {_time(duration)}", style.ORANGE, line, marker)
+            for duration, (line, marker) in zip(durations, _TWO_SCANS, strict=False)
+        ),
+    ]
+
+
+def _key(look: sweeps.Look) -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D(
+        [], [], color=look.colour, linestyle=look.line, marker=look.marker, markersize=3,
+        markerfacecolor="white", markeredgewidth=0.8, label=look.label,
+    )  # fmt: skip
 
 
 def _time(duration: float) -> str:
@@ -217,12 +256,15 @@ def predicted_std(
     return float(np.hypot(floor_m, error[inside].std())) if inside.any() else float("nan")
 
 
-def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: Study) -> list[Any]:
-    """Draw the spread of the height against the sensor's error; return what errors suffice."""
+def _sensor(
+    axes: Axes, error: xr.Dataset, products: Products, study: Study
+) -> tuple[list[Any], list[float]]:
+    """Draw the spread of the height against the sensor's error; return keys and what suffices."""
     from matplotlib.ticker import FixedLocator
     from scipy.stats import norm
 
     keys: list[Any] = axes.plot([], [], linestyle="", label="(d) a tenth more at an error of")
+    tolerated = []
     levels = error[_ERROR].values
     positive = levels[levels > 0]
     draws = norm.ppf((np.arange(_DRAWS) + 0.5) / _DRAWS)
@@ -261,6 +303,7 @@ def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: Study) -> 
         sweeps.curve(axes, positive, part.sel({_ERROR: positive}), look, scale=100)
         measured = motion.sufficient_error(levels, mean, factor=_TOLERATED)
         theory = motion.sufficient_error(fine, predicted, factor=_TOLERATED)
+        tolerated.append(measured)
         if np.isfinite(measured):
             axes.axvline(measured, color=look.colour, linewidth=0.7, linestyle=":")
         keys += axes.plot(
@@ -277,17 +320,72 @@ def _sensor(axes: Axes, error: xr.Dataset, products: Products, study: Study) -> 
     axes.set_xlabel("sensor error, std (m/s)")
     axes.set_ylabel("height error, std (cm)")
     axes.set_title(f"(d) speed sensor, {speed:g} m/s")
-    return keys
+    return keys, tolerated
 
 
-def _echoes(axes: Axes, error: xr.Dataset, study: Study) -> list[Any]:
-    """Draw the spread once the echoes have corrected the sensor's speed; return its key."""
-    duration = trajectory.scan_duration(study.radar, study.vehicle)
-    look = sweeps.Look(f"{_time(duration)}, corrected by echoes", style.ORANGE, "-", "s")
-    levels = error[_ERROR].values
-    sweeps.curve(axes, levels, error["std"].sel(region=_REGION), look, scale=100)
-    return [handle for handle in axes.get_legend_handles_labels()[0]
-            if handle.get_label() == look.label]  # fmt: skip
+def _corrected(axes: Axes, error: xr.Dataset, look: sweeps.Look) -> None:
+    """Draw the spread once echoes have corrected the sensor's speed."""
+    sweeps.curve(axes, error[_ERROR].values, error["std"].sel(region=_REGION), look, scale=100)
+
+
+# A figure is drawn for the page, for a slide and in other sizes; the first bound takes long.
+@lru_cache(maxsize=64)
+def _bound(
+    radar: trajectory.Radar, imaging: Any, scans: int, speed_m_per_s: float, duration_s: float
+) -> float:
+    """Return the bound of the speed that the echoes of one scan or of two tell, m/s."""
+    frequency = waveform.sampled(radar)
+    at_rest = trajectory.planned(radar)
+    first = motion.advance(at_rest, speed_m_per_s=speed_m_per_s, duration_s=duration_s)
+    options: dict[str, Any] = {
+        "extent": (imaging.x_min_m, imaging.x_max_m, imaging.y_min_m, imaging.y_max_m),
+        "wavelength_m": waveform.wavelength(waveform.carrier(frequency)),
+        "range_cell_m": waveform.range_resolution(float(frequency[-1] - frequency[0])),
+        "incoherent": _INCOHERENT,
+        "duration_s": duration_s,
+    }
+    if scans == 1:
+        return motion.speed_bound(first, **options)
+    second = motion.return_scan(
+        at_rest, speed_m_per_s=speed_m_per_s, duration_s=duration_s, interval_s=duration_s
+    )
+    return motion.next_scan_bound((first, second), interval_s=duration_s, **options)
+
+
+def _told(
+    axes: Axes,
+    speeds: Floats,
+    study: Study,
+    durations: list[float],
+    looks: list[sweeps.Look],
+    tolerated: list[float],
+) -> None:
+    """Draw what echoes tell of the speed at best, and what the heights tolerate."""
+    top = float(speeds.max())
+    at = np.linspace(top / 10, top, _BOUNDS)
+    own = trajectory.scan_duration(study.radar, study.vehicle)
+    curves = [(1, own), *((2, duration) for duration in durations)]
+    drawn = []
+    for (scans, duration), look in zip(curves, looks, strict=False):
+        values = np.array(
+            [
+                1000 * _bound(study.radar, study.imaging, scans, float(speed), duration)
+                for speed in at
+            ]
+        )
+        drawn.append(values)
+        axes.plot(at, values, color=look.colour, linestyle=look.line)
+    for value, colour in zip(tolerated, (style.INK, style.BLUE), strict=False):
+        if np.isfinite(value):
+            drawn.append(np.array([1000 * value]))
+            axes.axhline(1000 * value, color=colour, linewidth=0.7, linestyle=":")
+    everything = np.concatenate(drawn)
+    sweeps.log_y(axes, sweeps.around(everything[np.isfinite(everything)]))
+    axes.set_xlim(0, top)
+    axes.xaxis.set_major_locator(style.round_ticks(3))
+    axes.set_xlabel("forward speed (m/s)")
+    axes.set_ylabel("speed, std (mm/s)")
+    axes.set_title("(e) echoes at best")
 
 
 def _speed(value: float) -> str:
@@ -308,13 +406,16 @@ FIGURES = {
             "speed, and with that of an erroneous sensor. Dotted: amplitude of the target at the "
             "place where it is imaged. (d) Height error against the sensor's error, with the "
             "prediction from the heights of the places that the image shows instead; dotted "
-            "lines mark where it exceeds the error-free one by a tenth. Orange: the slow scan once "
-            "its echoes have corrected the sensor's speed. Those of the fast scan tell less than "
-            "the sensor. Lines are means and "
-            "bands 10 to 90 % of the realizations."
+            "lines mark where it exceeds the error-free one by a tenth. Orange: once the echoes "
+            "of the scan have corrected the sensor's speed, or those of the next one as well, on "
+            "the cart's way back. (e) The bound of the speed that they tell, and, dotted, the "
+            "error of the speed at which the height error is a tenth more: above its line one scan "
+            "does not suffice and the next one is needed. The estimate from one scan has two to "
+            "three times its bound. Of the fast scan alone, echoes tell less than the sensor. "
+            "Lines are means and bands 10 to 90 % of the realizations."
         ),
         sections=("figures", "radar", "imaging", "vehicle"),
         inputs=("terrain", "truth"),
-        sweeps=("speed", "speed_error", "echoes"),
+        sweeps=("speed", "speed_error", "echoes", "next_scan"),
     ),
 }

@@ -38,7 +38,7 @@ Spectrum = Literal["white", "sinusoidal", "random_walk"]
 _BOUND_POINTS, _BOUND_RANGES = 401, 8
 
 # Points along each side of the ground that the bound of two scans takes.
-_BOUND_SIDE = 40
+_BOUND_SIDE = 20
 
 
 variables.declare("true_trajectory", ANTENNAS)

@@ -7,12 +7,12 @@ import pytest
 import xarray as xr
 
 from vinsar.figures import moving
-from vinsar.radar import motion
+from vinsar.radar import motion, trajectory, waveform
 
 
 def test_moving_shows_the_sweeps_and_the_sensor_that_suffices(draw, lines_of, products, study):
     figure = draw("moving", products, study)
-    _, slow_focus, slow, _, fast, sensor = figure.axes
+    _, slow_focus, slow, _, fast, sensor, told = figure.axes
     speed = products["sweeps/speed"]
     std = 100 * speed["std"].sel(region="visible_ground").mean("realization")
     for axes, duration in ((slow, 0.5), (fast, 0.03)):
@@ -33,6 +33,42 @@ def test_moving_shows_the_sweeps_and_the_sensor_that_suffices(draw, lines_of, pr
         assert mark == motion.sufficient_error(levels, means, factor=1.1)
         shown = f"{1000 * mark:.2g} mm/s" if mark < 0.1 else f"{mark:.2g} m/s"
         assert any(shown in text.get_text() for text in figure.legends[1].get_texts())
+        assert 1000 * mark in [line.get_ydata()[0] for line in told.lines]
+    both = 100 * products["sweeps/next_scan"]["std"].sel(region="visible_ground").mean(
+        "realization"
+    )
+    for label, duration in (("0.5 s", 0.5), ("30 ms", 0.03)):
+        line = lines_of(sensor)[f"(d, e) and the next, {label}"]
+        np.testing.assert_allclose(line.get_ydata(), both.sel(vehicle_scan_duration_s=duration))
+
+
+def test_moving_shows_the_bounds_of_one_scan_and_of_two(draw, products, study):
+    one, two, fast = (
+        line.get_ydata() for line in draw("moving", products, study).axes[-1].lines[:3]
+    )
+    top = products["sweeps/speed"]["vehicle_forward_speed_m_per_s"].values.max()
+    at = np.array([top / 10, top])
+    part = study.imaging
+    antennas = trajectory.planned(study.radar)
+    frequency = waveform.sampled(study.radar)
+    options = {
+        "extent": (part.x_min_m, part.x_max_m, part.y_min_m, part.y_max_m),
+        "wavelength_m": 299_792_458.0 / frequency.mean(),
+        "range_cell_m": 299_792_458.0 / 2 / np.ptp(frequency),
+        "incoherent": 0.05,
+    }
+    for number in (0, -1):
+        for duration, found in ((0.5, two), (0.03, fast)):
+            times = {"duration_s": duration, "interval_s": duration}
+            scans = (
+                motion.advance(antennas, speed_m_per_s=at[number], duration_s=duration),
+                motion.return_scan(antennas, speed_m_per_s=at[number], **times),
+            )
+            bound = motion.next_scan_bound(scans, **times, **options)
+            assert found[number] == pytest.approx(1000 * bound)
+        driven = motion.advance(antennas, speed_m_per_s=at[number], duration_s=0.5)
+        bound = motion.speed_bound(driven, duration_s=0.5, **options)
+        assert one[number] == pytest.approx(1000 * bound)
 
 
 def test_a_wrong_speed_shows_the_heights_of_other_places(products):
