@@ -50,8 +50,11 @@ _APART, _REACH, _FEWEST, _MOST = 1.5, 4.0, 12, 1001
 # How far the best match must lie above the median of all, in their spread.
 _CLEAR = 8.0
 
-# Heights tried: so many to a cycle of the phase between the antennas, from level ground.
+# Heights tried: so many to a cycle of the phase between the antennas, from level ground. A cycle
+# away from it the match must be better by so much of the power; of the ground as a whole, the
+# likelihood by such a share.
 _TO_CYCLE, _LOW, _HIGH = 8, -5, 11
+_NEARER, _RATHER = 0.1, 0.15
 
 # A step of height, m, and the least that a metre of it may change the path between the antennas.
 _SMALL_M = 0.01
@@ -142,10 +145,10 @@ def estimate(
     # Ground a cycle higher would match nearly as well at another speed.
     candidates = []
     for cycles in (-1, 0, 1):
-        about = float(tried[best]) + cycles * pair.alike()
-        surface = pair.surface(about, level + cycles * pair.cycle)
-        candidates.append((*pair.best(about + step * _NEAR, surface), level + cycles * pair.cycle))
-    found, std, _, level = min(candidates, key=lambda candidate: candidate[2])
+        about, ground = tried[best] + cycles * pair.alike(), level + cycles * pair.cycle
+        speed, std, cost = pair.best(about + step * _NEAR, pair.surface(about, ground))
+        candidates.append((cost * (1 if cycles else 1 + _RATHER), speed, std, ground))
+    _, found, std, level = min(candidates)
     closer = _CLOSER
     for _ in range(_ROUNDS):
         before = found
@@ -291,7 +294,8 @@ class _Pair:
             between = _windows(first[0] * first[1].conj() + second[0] * second[1].conj()).real
             scans = np.abs(_windows(first * second.conj())).sum(axis=0)
             antennas.append(between / power)
-            both.append((between + scans) / power)
+            away = _NEARER * abs(height - level) / self.cycle
+            both.append((between + scans) / power - away)
         at = np.clip(np.argmax(both, axis=0), 1, heights.size - 2)[None]
         before, here, after = (
             np.take_along_axis(np.array(antennas), at + step, 0)[0] for step in (-1, 0, 1)
