@@ -37,7 +37,7 @@ _LOOKS = {
 _TWO_SCANS = (style.DASHED, "D"), (style.DASH_DOTTED, "v")
 _HEIGHT_MM = 108.0
 _BOTTOM, _TALL, _LOW, _HIGH = 29.0, 72.0, 32.0, 69.0
-# Heights of (d) and, above its title and the x axis of (e), of (e).
+# Heights of (d) and, below its x axis, of (e).
 _SENSOR_MM, _TOLD_MM = 33.0, 25.0
 # Share of the power that the bounds take as incoherent: relief and sidelobes of range.
 _INCOHERENT = 1 / 20
@@ -96,7 +96,7 @@ def draw(products: Products, study: Study) -> Figure:
         if number == 0:
             upper.set_ylabel("amplitude (1)")
             lower.set_ylabel("height error, std (cm)")
-    axes = style.place(figure, _LEFTS[3], _BOTTOM, _WIDTHS[3], _SENSOR_MM)
+    axes = style.place(figure, _LEFTS[3], _BOTTOM + _TALL - _SENSOR_MM, _WIDTHS[3], _SENSOR_MM)
     keys, tolerated = _sensor(axes, error, products, study)
     looks = _looks(study, durations)
     echoes = variables.swept(products["sweeps/echoes"], _ERROR).sortby(_ERROR)
@@ -107,8 +107,8 @@ def draw(products: Products, study: Study) -> Figure:
             _corrected(axes, both.sel({_DURATION: duration}), look)
     _level(axes, relief)
     sweeps.log_y(axes, limits)
-    upper = style.place(figure, _LEFTS[3], _BOTTOM + _TALL - _TOLD_MM, _WIDTHS[3], _TOLD_MM)
-    _told(upper, speed[_SPEED].values, study, durations, looks, tolerated)
+    lower = style.place(figure, _LEFTS[3], _BOTTOM, _WIDTHS[3], _TOLD_MM)
+    _told(lower, speed[_SPEED].values, study, durations, looks, tolerated)
     handles += [*_keys(), *(_key(look) for look in looks)]
     sweeps.legend(figure, handles, _LEFTS[0], 2.0, 3)
     sweeps.legend(figure, keys, _LEFTS[3] - 13.0, 2.0, 1)
@@ -119,9 +119,9 @@ def _looks(study: Study, durations: list[float]) -> list[sweeps.Look]:
     """Return how the echoes' corrections look: of one scan, then of two by duration."""
     own = _time(trajectory.scan_duration(study.radar, study.vehicle))
     return [
-        sweeps.Look(f"(d, e) echoes of a scan, {own}", style.ORANGE, "-", "s"),
+        sweeps.Look(f"(d, e) one scan, {own}", style.ORANGE, "-", "s"),
         *(
-            sweeps.Look(f"(d, e) and the next, {_time(duration)}", style.ORANGE, line, marker)
+            sweeps.Look(f"(d, e) two scans, {_time(duration)}", style.ORANGE, line, marker)
             for duration, (line, marker) in zip(durations, _TWO_SCANS, strict=False)
         ),
     ]

@@ -38,7 +38,7 @@ def test_moving_shows_the_sweeps_and_the_sensor_that_suffices(draw, lines_of, pr
         "realization"
     )
     for label, duration in (("0.5 s", 0.5), ("30 ms", 0.03)):
-        line = lines_of(sensor)[f"(d, e) and the next, {label}"]
+        line = lines_of(sensor)[f"(d, e) two scans, {label}"]
         np.testing.assert_allclose(line.get_ydata(), both.sel(vehicle_scan_duration_s=duration))
 
 
