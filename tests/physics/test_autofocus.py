@@ -102,6 +102,20 @@ def test_errors_along_the_rail_are_found(rail, received, common):
     assert (after[..., 0] - after[..., 1]).std() < 1
 
 
+def test_a_slow_vibration_of_each_channel_is_found(rail, received):
+    """It leaves each image in focus, and the interferogram wrong by whole radians."""
+    recorded = recorded_with(rail, "y", 2e-3, common=False, spectrum="sinusoidal", seed=8)
+    found = autofocus.estimate(received, recorded, extent=EXTENT)
+    assert not found.reason
+    assert found.focus[0] > 0.75
+    before, after = (
+        left_over(rail, recorded, moved, MIDDLE)
+        for moved in (np.zeros_like(found.displacement), found.displacement)
+    )
+    assert (before[0] - before[1]).std() > 1 / 2
+    assert (after[0] - after[1]).std() < 1 / 8
+
+
 @pytest.mark.parametrize("channel", [0, 1])
 def test_errors_of_one_channel_are_found_by_itself(rail, received, channel):
     antennas = rail.isel(channel=[channel])

@@ -91,8 +91,8 @@ _BY_CHANCE = 8
 _ACROSS, _ALONG = 6, 4
 _WINDOW = (9, 3)
 
-# Steps of the image at most; relative gain in focus that ends them.
-_MOST_STEPS, _LEAST_GAIN = 16, 1e-3
+# Steps of the image at most; relative gain in energy, and fall of the focus, that end them.
+_MOST_STEPS, _LEAST_GAIN, _MOST_FALL = 16, 1e-3, 0.1
 
 # What a start must gain in focus over one that assumes less.
 _PREFERENCE = 1.015
@@ -106,6 +106,9 @@ _PROMINENT, _SHARPER, _LEAST_SHARP_FOCUS, _PROMINENT_CELLS = 4.0, 1.1, 0.4, 64
 
 # Displacement, in wavelengths, that changes no image.
 _LEAST_MOVE = 1e-4
+
+# Share of its sharpness that a smooth path keeps once the speckle has its say.
+_LEAST_KEPT = 0.5
 
 # What a curve must gain in sharpness over a line.
 _MUCH_SHARPER = 1.3
@@ -293,11 +296,24 @@ def _by_speckle(image: _Image) -> Motion:
         reason = f"the echoes of all positions agree to {focus[1]:.0%} only"
         return _nothing(channels, positions, reason, focus)
     found = _moved(samples, result.displacement, result.covariance, focus)
-    if result.formed.energy < _WORTH * before:
+    if result.formed.energy < _WORTH * before and not _differ(found):
         reason = f"the navigated positions focus to {focus[0]:.0%} already"
         none = np.zeros_like(found.range_correction)
         return replace(found, displacement=still, range_correction=none, reason=reason)
     return found
+
+
+def _differ(found: Motion) -> bool:
+    """Return whether the channels' errors differ by more than chance.
+
+    Errors that change slowly along the aperture leave each image in focus, and yet an interferogram
+    holds their difference; a constant is not theirs to tell.
+    """
+    if len(found.range_correction) < 2:
+        return False
+    apart = found.range_correction[1] - found.range_correction[0]
+    variance = (found.range_std**2).sum(axis=0)
+    return bool(((apart - apart.mean()) ** 2 / variance).mean() > 1)
 
 
 def _moved(
@@ -919,12 +935,18 @@ class _Image:
         """Take steps until the energy gains no more."""
         prior = np.full((self.samples.channels, 3), _FIRST_STD * self.samples.wavelength)
         formed = self.form(displacement, apart=True) if displacement.any() else self.recorded
-        best = 0.0
+        kept = None
+        # Positions that crowd together raise the energy as well, but not its share of the full one.
+        best = self.samples.focus(formed.energy, displacement)
         for _ in range(_MOST_STEPS):
-            best = formed.energy
+            before = formed.energy
             state = self.step(formed, displacement, prior)
             displacement, prior, formed = state.displacement, state.prior, state.formed
-            if formed.energy < best * (1 + _LEAST_GAIN):
+            focus = self.samples.focus(formed.energy, displacement)
+            if kept is not None and focus < best - _MOST_FALL:
+                return kept
+            kept, best = state, max(best, focus)
+            if formed.energy < before * (1 + _LEAST_GAIN):
                 break
         return state
 
@@ -1000,11 +1022,13 @@ class _Sharpest:
         refined = self.image.refine(displacement)
         recorded = samples.focus(self.image.recorded.energy, still)
         focus = recorded, samples.focus(refined.formed.energy, refined.displacement)
-        if focus[1] > _LEAST_FOCUS and (
-            self.sharpness_of(refined.displacement).mean() * _PREFERENCE > best.mean()
-        ):
+        smooth = samples.focus(self.image.form(displacement).energy, displacement)
+        kept = self.sharpness_of(refined.displacement).mean() / best.mean()
+        # Boxes among speckle: polynomials sharpen them more than they are. Points stay points.
+        as_good = focus[1] > smooth - _MOST_FALL and kept > _LEAST_KEPT
+        if focus[1] > _LEAST_FOCUS and (kept * _PREFERENCE > 1 or as_good):
             return _moved(samples, refined.displacement, refined.covariance, focus)
-        focus = recorded, samples.focus(self.image.form(displacement).energy, displacement)
+        focus = recorded, smooth
         # Echoes from outside the image lower the focus, but a path that shakes leaves next to none.
         if focus[1] < _LEAST_SHARP_FOCUS:
             return found
