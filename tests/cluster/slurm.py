@@ -104,6 +104,10 @@ def running(folder: Path, cpus: int) -> Iterator[dict[str, str]]:
             ["scancel", "--user=root", "--state=PENDING,RUNNING"],
             env=environment, check=False, capture_output=True,
         )  # fmt: skip
+        # What still runs for a job would look for a controller that is gone.
+        until = time.monotonic() + 20
+        while _jobs(environment) and time.monotonic() < until:
+            time.sleep(0.2)
         for daemon in reversed(daemons):
             daemon.terminate()
         for daemon in daemons:
@@ -120,6 +124,12 @@ def _idle(environment: dict[str, str]) -> bool:
         ["sinfo", "-h", "-o", "%t"], env=environment, capture_output=True, text=True, check=False
     )
     return done.stdout.strip() == "idle"
+
+
+def _jobs(environment: dict[str, str]) -> list[str]:
+    listed = ["squeue", "-h", "--states=PENDING,RUNNING,COMPLETING", "-o", "%A"]
+    done = subprocess.run(listed, env=environment, capture_output=True, text=True, check=False)
+    return done.stdout.split()
 
 
 def _wait(condition, daemons, folder: Path) -> None:

@@ -16,6 +16,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 import slurm
 
 import vinsar
+from vinsar import figures
+from vinsar.study import composition
 from vinsar.study.options import Dask, Sweep
 from vinsar.sweeps import cluster, sweep
 
@@ -49,11 +51,29 @@ def checkout(tmp_path_factory):
     return folder
 
 
+# Each job of SLURM starts Snakemake twice, which takes longer than the rule. But for two they go in
+# jobs together, where Snakemake runs them in their order, each with the cores that it takes.
+ALONE = ("trajectory", "claims")
+GROUPS = {
+    "chain": [*composition.STAGES, "accuracy_summary"],
+    "sweeps": ["sweep"],
+    "figures": [*(f"figure_{name}" for name in figures.FIGURES), "figure_fig3_panels"],
+}
+IN_GROUPS = [
+    "--groups",
+    *(f"{rule}={group}" for group, rules in GROUPS.items() for rule in rules if rule not in ALONE),
+    "--group-components",
+    *(f"{group}=100" for group in GROUPS),
+]
+# Not the waits that spare the controller of a cluster.
+AT_ONCE = ("--slurm-init-seconds-before-status-checks", "1")
+
+
 def started(checkout, environment, *arguments):
     with (checkout / "out.txt").open("wb") as out:
         return subprocess.Popen(
             [sys.executable, "-P", "workflow/start.py", "--workflow-profile", "profiles/slurm",
-             "--configfile", "config/smoke.yaml", "--nocolor", *arguments],
+             "--configfile", "config/smoke.yaml", "--nocolor", *AT_ONCE, *arguments],
             cwd=checkout,
             env=environment | {"PYTHONPATH": str(checkout / "src")},
             stdout=out,
@@ -74,7 +94,7 @@ def jobs(environment, state):
 
 
 def test_the_smoke_study_runs_to_its_end_though_a_job_is_killed(checkout, environment):
-    process = started(checkout, environment)
+    process = started(checkout, environment, *IN_GROUPS)
     victim = None
     while process.poll() is None:
         running = jobs(environment, "RUNNING")
