@@ -151,9 +151,13 @@ def fork_jobs():
         if elsewhere or digests_of_library() != loaded:
             return execute(self, command, fname=fname, **options)
         job = forks.Process(target=run_script, args=(fname, self.resources.get("tmpdir"), loaded))
-        # One at a time: each start asks whether the others have ended, too.
-        with turn:
-            job.start()
+        try:
+            # One at a time: each start asks whether the others have ended, too.
+            with turn:
+                job.start()
+        except OSError:
+            # Such as a folder for temporary files whose path is too long for a socket.
+            return execute(self, command, fname=fname, **options)
         with benchmarked(job.pid, self.bench_record):
             multiprocessing.connection.wait([job.sentinel])
         with turn:

@@ -229,12 +229,16 @@ def test_it_runs_in_a_folder_of_any_name(new_checkout, tmp_path):
     # Snakemake starts each job by the path of its Python.
     venv = moved / "venv"
     venv.symlink_to(sys.prefix)
-    done = subprocess.run(
-        [venv / "bin/python", "-P", "workflow/start.py", "--nocolor", "--configfile", "tiny.yaml",
-         "results/tiny/trajectory.nc"],
-        cwd=moved, env=os.environ | {"PYTHONPATH": str(moved / "src")},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    record = json.loads((moved / "results/tiny/records/trajectory.nc.json").read_text())
-    assert record["rule"] == "trajectory"
+    far = tmp_path / ("long" * 25)
+    far.mkdir()
+    # Each way of starting a job: sockets cannot have the longer path, and then none forks.
+    for rule, temporary in (("trajectory", far), ("terrain", tmp_path)):
+        done = subprocess.run(
+            [venv / "bin/python", "-P", "workflow/start.py", "--nocolor", "--configfile",
+             "tiny.yaml", f"results/tiny/{rule}.nc"],
+            cwd=moved, capture_output=True, text=True, check=False,
+            env=os.environ | {"PYTHONPATH": str(moved / "src"), "TMPDIR": str(temporary)},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        record = json.loads((moved / f"results/tiny/records/{rule}.nc.json").read_text())
+        assert record["rule"] == rule
