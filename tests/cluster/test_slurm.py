@@ -95,12 +95,14 @@ def jobs(environment, state):
 
 def test_the_smoke_study_runs_to_its_end_though_a_job_is_killed(checkout, environment):
     process = started(checkout, environment, *IN_GROUPS)
-    victim = None
+    victim, first = None, set()
     while process.poll() is None:
         running = jobs(environment, "RUNNING")
-        # Not the first of all: something is finished by then.
-        if victim is None and running and (checkout / "results/smoke/trajectory.nc").exists():
-            victim = running[0]
+        # Not the first of all, which may be about to end: something is finished by then.
+        if not (checkout / "results/smoke/trajectory.nc").exists():
+            first |= set(running)
+        elif victim is None and set(running) - first:
+            (victim, *_) = set(running) - first
             subprocess.run(["scancel", victim], env=environment, check=True)
         time.sleep(0.2)
     assert process.returncode == 0, said(checkout)
