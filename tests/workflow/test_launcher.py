@@ -277,7 +277,10 @@ def test_test_is_pytest(lasting):
 
 
 def test_what_others_set_for_other_programs_is_left_behind(lasting):
-    others = {"PYTHONPATH": "/mine", "PYTHONWARNINGS": "error", "MPLBACKEND": "module://mine"}
+    others = {
+        "PYTHONPATH": "/mine", "PYTHONWARNINGS": "error", "PYTHONDONTWRITEBYTECODE": "1",
+        "MPLBACKEND": "module://mine",
+    }  # fmt: skip
     tells = told(lasting.run(**others))["environment"]
     assert not set(others) & set(tells)
     assert tells["PYTHONUTF8"] == "1"
