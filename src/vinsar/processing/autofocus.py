@@ -292,10 +292,13 @@ def _by_speckle(image: _Image) -> Motion:
                 start, best = other, energy
     result = image.refine(start)
     if in_focus and _differ(_moved(samples, result.displacement, result.covariance, (0, 0))):
-        # Energy hardly tells when errors that change slowly are found; the first step does.
+        # Energy hardly tells when errors that change slowly are found; the first step does. Errors
+        # along the rail, which it takes for others, it leaves with less energy.
         other = samples.along_sight(_coarse(samples)[0])
         if image.form(other).energy > before:
-            result = image.refine(other)
+            again = image.refine(other)
+            if _PREFERENCE * again.formed.energy > result.formed.energy:
+                result = again
     focus = samples.focus(before, still), samples.focus(result.formed.energy, result.displacement)
     if focus[1] < _LEAST_FOCUS:
         reason = f"the echoes of all positions agree to {focus[1]:.0%} only"
