@@ -20,7 +20,7 @@ import numpy as np
 
 from vinsar.foundations.constants import NORMAL_PER_MAD
 from vinsar.processing import focusing
-from vinsar.processing.speed import Speed
+from vinsar.processing.speed import Speed, unusable, weighed
 from vinsar.radar import motion, trajectory, waveform
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-_LEAST_POSITIONS = 16
 _OVERSAMPLING = 8
 _MARGIN_M = 0.5
 
@@ -70,9 +69,6 @@ _LEAST_STD = 0.08
 
 # Least of what a window lacks to full coherence.
 _LEAST = 1e-6
-
-# What the standard deviation may be of the sensor's.
-_BETTER = 0.7
 
 
 def estimate(
@@ -113,15 +109,10 @@ def estimate(
         logger.warning("next scan: no correction of the speed, because %s", reason)
         return Speed(0.0, sensor_std_m_per_s, reason)
 
-    count = recorded[0].sizes["position"]
-    if sensor_std_m_per_s == 0:
-        return nothing("the sensor is stated to be exact (vehicle.speed_error_m_per_s is 0)")
-    if count < _LEAST_POSITIONS:
-        return nothing(f"{count} positions are too few; take {_LEAST_POSITIONS}")
+    if reason := unusable(echoes, sensor_std_m_per_s):
+        return nothing(reason)
     if recorded[0].sizes["channel"] == 1:
         return nothing("one antenna tells no heights, which would be taken for speed")
-    if not all(echo["echo"].values.any(axis=(0, 2)).all() for echo in echoes):
-        return nothing("some positions have no echo")
     carrier = waveform.carrier(echoes[0]["frequency"].values)
     step = waveform.wavelength(carrier) / (8 * duration_s)
     most = max(_FEWEST, int(np.ceil(_REACH * sensor_std_m_per_s / (_APART * step))) + 1)
@@ -159,13 +150,13 @@ def estimate(
     if not np.isfinite(std):
         return nothing("at no speed do both scans match best")
     std = float(np.hypot(std, _LEAST_STD * step))
-    if std > _BETTER * sensor_std_m_per_s:
-        return nothing(
-            f"they tell the speed to {std:.2g} m/s, the sensor to {sensor_std_m_per_s:.2g} m/s"
-        )
-    share = sensor_std_m_per_s**2 / (sensor_std_m_per_s**2 + std**2)
-    logger.info("next scan: speed corrected by %+.4f m/s, known to %.4f m/s", share * found, std)
-    return Speed(share * found, float(np.sqrt(share) * std))
+    result = weighed(found, std, sensor_std_m_per_s)
+    if result.reason:
+        return nothing(result.reason)
+    logger.info(
+        "next scan: speed corrected by %+.4f m/s, known to %.4f m/s", result.correction, std
+    )
+    return result
 
 
 class _Pair:

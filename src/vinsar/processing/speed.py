@@ -24,6 +24,8 @@ from vinsar.processing import focusing
 from vinsar.radar import trajectory, waveform
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -92,6 +94,43 @@ def way(speed_m_per_s: float, *, positions: int, duration_s: float) -> Floats:
     return result
 
 
+def unusable(echoes: Sequence[xr.Dataset], sensor_std_m_per_s: float) -> str:
+    """Return why no scan like these can correct the sensor; empty if one may.
+
+    Parameters
+    ----------
+    echoes
+        Products ``received``.
+    sensor_std_m_per_s
+        Stated standard deviation of the sensor, m/s.
+    """
+    if sensor_std_m_per_s == 0:
+        return "the sensor is stated to be exact (vehicle.speed_error_m_per_s is 0)"
+    positions = echoes[0].sizes["position"]
+    if positions < _LEAST_POSITIONS:
+        return f"{positions} positions are too few; take {_LEAST_POSITIONS}"
+    if not all(echo["echo"].values.any(axis=(0, 2)).all() for echo in echoes):
+        return "some positions have no echo"
+    return ""
+
+
+def weighed(found: float, std: float, sensor_std_m_per_s: float) -> Speed:
+    """Return a correction found from echoes, weighed against the sensor; none if it is too coarse.
+
+    Parameters
+    ----------
+    found, std
+        The correction and its standard deviation, m/s.
+    sensor_std_m_per_s
+        Stated standard deviation of the sensor, m/s.
+    """
+    if std > _BETTER * sensor_std_m_per_s:
+        reason = f"they tell the speed to {std:.2g} m/s, the sensor to {sensor_std_m_per_s:.2g} m/s"
+        return Speed(0.0, sensor_std_m_per_s, reason)
+    share = sensor_std_m_per_s**2 / (sensor_std_m_per_s**2 + std**2)
+    return Speed(share * found, float(np.sqrt(share) * std))
+
+
 def estimate(
     echo: xr.Dataset,
     recorded: xr.Dataset,
@@ -127,12 +166,8 @@ def estimate(
         return Speed(0.0, sensor_std_m_per_s, reason)
 
     positions = recorded.sizes["position"]
-    if sensor_std_m_per_s == 0:
-        return nothing("the sensor is stated to be exact (vehicle.speed_error_m_per_s is 0)")
-    if positions < _LEAST_POSITIONS:
-        return nothing(f"{positions} positions are too few; take {_LEAST_POSITIONS}")
-    if not (echo["echo"].values.any(axis=(0, 2))).all():
-        return nothing("some positions have no echo")
+    if reason := unusable([echo], sensor_std_m_per_s):
+        return nothing(reason)
     image = _Image(echo, recorded, extent, duration_s)
     phase = image.end_phase(sensor_std_m_per_s)
     if phase < _LEAST_PHASE:
@@ -170,13 +205,11 @@ def estimate(
         if not np.isfinite(std):
             return nothing("no speed makes the image sharpest")
         found += float(np.clip(shift, near[0], near[-1]))
-    if std > _BETTER * sensor_std_m_per_s:
-        return nothing(
-            f"they tell the speed to {std:.2g} m/s, the sensor to {sensor_std_m_per_s:.2g} m/s"
-        )
-    share = sensor_std_m_per_s**2 / (sensor_std_m_per_s**2 + std**2)
-    logger.info("speed: corrected by %+.4f m/s, known to %.4f m/s", share * found, std)
-    return Speed(share * found, np.sqrt(share) * std)
+    result = weighed(found, std, sensor_std_m_per_s)
+    if result.reason:
+        return nothing(result.reason)
+    logger.info("speed: corrected by %+.4f m/s, known to %.4f m/s", result.correction, std)
+    return result
 
 
 class _Image:
