@@ -13,7 +13,7 @@ From the data alone; three signs tell what a standard deviation does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -262,9 +262,7 @@ class Fan:
     y
         Axis of the grid, m.
     columns
-        Column of each ray in each row (row, ray).
-    crossed
-        Whether the ray crosses the grid in that row (row, ray).
+        Column of each ray in each row (row, ray); -1 where it is beside the grid.
     rays
         Ray through each cell (row, column).
     """
@@ -272,7 +270,6 @@ class Fan:
     antenna: Floats
     y: Floats
     columns: NDArray[np.integer]
-    crossed: Flags
     rays: NDArray[np.integer]
 
     @classmethod
@@ -295,33 +292,22 @@ class Fan:
         left, right = min(ends), max(ends)
         count = int(np.ceil(2 * (right - left) * ahead[-1] / spacing)) + 2
         slope = np.linspace(left, right, count)
-        column = (antenna[0] + slope * ahead[:, None] - x[0]) / spacing
-        nearest = np.rint(column).astype(int)
-        ray = ((x - antenna[0]) / ahead[:, None] - left) / (slope[1] - slope[0])
+        column = np.rint((antenna[0] + slope * ahead[:, None] - x[0]) / spacing).astype(np.int32)
+        ray = np.rint(((x - antenna[0]) / ahead[:, None] - left) / (slope[1] - slope[0]))
         return cls(
             antenna=antenna,
             y=y,
-            columns=np.clip(nearest, 0, x.size - 1),
-            crossed=(nearest >= 0) & (nearest < x.size),
-            rays=np.clip(np.rint(ray).astype(int), 0, count - 1),
+            columns=np.where((column >= 0) & (column < x.size), column, -1),
+            rays=np.clip(ray, 0, count - 1).astype(np.int32),
         )
-
-    def along(self, values: NDArray[Any], outside: float | bool) -> NDArray[Any]:
-        """Return values of the grid by ray (row, ray)."""
-        found = values[np.arange(self.y.size)[:, None], self.columns]
-        return np.where(self.crossed, found, outside)
-
-    def back(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return values by ray on the grid (row, column)."""
-        return np.asarray(values[np.arange(self.y.size)[:, None], self.rays])
 
     def line_of_sight(self, height: Floats, known: Flags) -> Floats:
         """Return the height up to which known heights before it hide each cell, m."""
-        ahead = (self.y - self.antenna[1])[:, None]
-        along = self.along(np.where(known, height, -np.inf), -np.inf)
-        horizon = np.maximum.accumulate((along - self.antenna[2]) / ahead, axis=0)
-        before = np.vstack([np.full((1, horizon.shape[1]), -np.inf), horizon[:-1]])
-        return np.asarray(self.antenna[2] + self.back(before * ahead))
+        from vinsar.kernels import sight
+
+        line = np.where(known, height - self.antenna[2], -np.inf)
+        sight.horizon(line, self.columns, self.rays, self.y - self.antenna[1])
+        return self.antenna[2] + line
 
     def too_low(self, dark: Flags, height: Floats, ambiguity: Floats, *, reach_m: float) -> Flags:
         """Return what stands before a shadow and is half a cycle too low for its length.
@@ -342,49 +328,22 @@ class Fan:
         ndarray of bool, shape (y, x)
             Cells before such shadows.
         """
-        spacing = float(self.y[1] - self.y[0])
-        reach = max(1, round(reach_m / spacing))
-        away, top = self.y - self.antenna[1], float(self.antenna[2])
-        shade = np.asarray(self.along(dark, False), np.int8)
-        heights = np.asarray(self.along(height, np.nan), float)
-        cycle = np.asarray(self.along(ambiguity, np.inf), float)
-        ground = float(np.nanmedian(height)) if np.isfinite(height).any() else 0.0
-        found = np.zeros(shade.shape, bool)
-        edge = np.diff(np.pad(shade, ((1, 1), (0, 0))), axis=0)
-        (ray, begin), (_, end) = np.nonzero(edge.T == 1), np.nonzero(edge.T == -1)
-        told = (end - begin >= reach) & (begin > 0)
-        ray, begin, end = ray[told], begin[told], end[told]
-        behind, inside = _taken(heights, end, ray, reach)
-        level = np.where(
-            inside.any(axis=1) & (np.isfinite(behind) | ~inside).all(axis=1),
-            _medians(np.where(inside, behind, np.inf), inside.sum(axis=1)),
-            ground,
+        from vinsar.kernels import sight
+
+        known = height[np.isfinite(height)]
+        found = np.zeros(self.columns.shape, bool)
+        sight.too_low(
+            dark,
+            height,
+            ambiguity,
+            self.columns,
+            self.y - self.antenna[1],
+            float(self.antenna[2]),
+            float(np.median(known)) if known.size else 0.0,
+            max(1, round(reach_m / grid.step(self.y))),
+            found,
         )
-        length = (end - begin) * spacing
-        needed = level + (top - level) * length / (away[begin] + length)
-        here, inside = _taken(heights, begin - reach, ray, reach)
-        highest = np.where(inside & np.isfinite(here), here, -np.inf).max(axis=1, initial=-np.inf)
-        low = np.isfinite(highest) & (needed - highest > cycle[begin - 1, ray] / 2)
-        rows = (begin - reach)[:, None] + np.arange(reach)
-        flagged = low[:, None] & inside
-        found[rows[flagged], np.broadcast_to(ray[:, None], rows.shape)[flagged]] = True
-        return np.asarray(self.back(found), bool)
-
-
-def _taken(
-    values: Floats, first: NDArray[np.integer], ray: NDArray[np.integer], count: int
-) -> tuple[Floats, Flags]:
-    """Return so many rows of rays from the first on (n, count), and which of them there are."""
-    rows = first[:, None] + np.arange(count)
-    inside = (rows >= 0) & (rows < values.shape[0])
-    return values[np.clip(rows, 0, values.shape[0] - 1), ray[:, None]], inside
-
-
-def _medians(values: Floats, counts: NDArray[np.integer]) -> Floats:
-    """Return the median of the smallest so many values of each row."""
-    ordered = np.sort(values, axis=1)
-    row, last = np.arange(len(values)), np.maximum(counts, 1)
-    return np.asarray((ordered[row, (last - 1) // 2] + ordered[row, last // 2]) / 2)
+        return np.asarray(np.take_along_axis(found, self.rays, axis=1))
 
 
 def uncertain_cycles(

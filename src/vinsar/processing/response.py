@@ -208,7 +208,7 @@ class Average:
 class Goldstein:
     """Goldstein's filter with the weights that it found.
 
-    Patches overlap by three quarters here, whatever the filter's own do.
+    Patches overlap by half here, whatever the filter's own do.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ class Goldstein:
     def __init__(self, interferogram: Complexes, *, alpha: float, patch_px: int) -> None:
         from vinsar.kernels import patches as kernel
 
-        step = next(n for n in range(patch_px // 4, 0, -1) if patch_px % n == 0)
+        step = next(n for n in range(patch_px // 2, 0, -1) if patch_px % n == 0)
         self.patches = Patches(interferogram.shape, patch_px, step)
         spectra = self._spectra(interferogram)
         power = (spectra.real**2 + spectra.imag**2).transpose(0, 2, 1, 3)
