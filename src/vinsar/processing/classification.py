@@ -109,7 +109,9 @@ def _surroundings(values: Floats, window_px: tuple[int, int]) -> Floats:
     around = np.pad(few, [(part, part) for part in reach], mode="symmetric")
     windows = np.lib.stride_tricks.sliding_window_view(around, [2 * part + 1 for part in reach])
     nodes = [np.unique(np.append(np.arange(0, size, _APART), size - 1)) for size in few.shape]
-    medians = np.median(windows[np.ix_(*nodes)], axis=(2, 3))
+    some = windows[np.ix_(*nodes)]
+    # Of an odd number of values; rows are sorted faster than their median is selected.
+    medians = np.sort(some.reshape(*some.shape[:2], -1), axis=2)[..., windows[0, 0].size // 2]
     for axis, (size, step, node) in enumerate(zip(values.shape, steps, nodes, strict=True)):
         medians = _interpolated(medians, node * step, size, axis)
     return medians
@@ -202,26 +204,32 @@ def split_band(
         parts.append(
             _outer_thirds(image * carrier, spacing[1], resolution[1].mean(axis=0), carrier)
         )
-    thirds = []
-    for lower, upper, share in zip(*parts, shares, strict=True):
+    # Of each third the product, and both powers.
+    thirds = np.empty((*phase.shape, 2, 4))
+    for number, (lower, upper, share) in enumerate(zip(*parts, shares, strict=True)):
         turned = lower * np.conj(upper) * _phasor(phase * (1 + share))
-        thirds.append((turned, np.abs(lower) ** 2, np.abs(upper) ** 2))
+        for kind, values in enumerate((turned.real, turned.imag, _power(lower), _power(upper))):
+            thirds[..., number, kind] = values
     turn = 2 * np.pi * float(shares[1] - shares[0])
     result = []
     for looks in SPLIT_LOOKS:
         side = cells.window(looks)
         count = cells.extent(side) / (3 * resolution[0] * resolution[1])
         covered = uncertainty.mean(np.ones(phase.shape), side, outside="zero")
-        sums, variance = [], np.zeros(phase.shape)
-        for third in thirds:
-            total, *powers = (uncertainty.mean(part, side, outside="zero") for part in third)
-            coherence = np.abs(total) / np.sqrt(np.maximum(powers[0] * powers[1], _TINY))
-            coherence = np.clip(coherence, 0.02, 0.9999)
-            variance += (1 - coherence**2) / (2 * coherence**2 * np.maximum(count * covered, 1))
-            sums.append(total)
+        means = uncertainty.mean(thirds.reshape(*phase.shape, -1), side, outside="zero")
+        means = np.moveaxis(means.reshape(thirds.shape), (2, 3), (1, 0))
+        real, imag, *powers = np.ascontiguousarray(means)
+        sums = real + 1j * imag
+        squared = (real**2 + imag**2) / np.maximum(powers[0] * powers[1], _TINY)
+        squared = np.clip(squared, 0.02**2, 0.9999**2)
+        variance = ((1 - squared) / squared).sum(axis=0) / (2 * np.maximum(count * covered, 1))
         lacking = np.angle(sums[1] * np.conj(sums[0])) / turn
         result.append(Cycles(lacking if rising else -lacking, np.sqrt(variance) / turn))
     return result
+
+
+def _power(values: Complexes) -> Floats:
+    return np.asarray(values.real**2 + values.imag**2)
 
 
 def _phasor(phase: Floats) -> NDArray[np.complex64]:

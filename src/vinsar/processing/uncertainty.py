@@ -77,11 +77,16 @@ class Cells:
     spacing: Spacing
 
     @cached_property
+    def typical(self) -> tuple[float, float]:
+        """Median resolution in x and in y, m."""
+        # It changes slowly: a few of its values tell their median.
+        across, ahead = (float(np.median(part[::4, ::4])) for part in self.resolution)
+        return across, ahead
+
+    @property
     def area(self) -> float:
-        """Median area of a cell, m^2."""
-        # Resolution changes slowly: a few of its values tell their median.
-        few = self.resolution[:, ::4, ::4]
-        return float(np.median(few[0] * few[1]))
+        """Area of a cell of median sides, m^2."""
+        return self.typical[0] * self.typical[1]
 
     def window(self, looks: float, *, elongation: float = 1) -> tuple[int, int]:
         """Return the sides of a square window of about so many looks, odd numbers of pixels.
@@ -121,7 +126,7 @@ def mean(
     Parameters
     ----------
     values
-        Real or complex values (y, x).
+        Real or complex values (y, x), or several of each pixel (y, x, n).
     window_px
         Rows and columns of the window, odd.
     outside
@@ -129,18 +134,18 @@ def mean(
 
     Returns
     -------
-    ndarray, shape (y, x)
-        Means in double precision.
+    ndarray
+        Means in double precision, of the shape of the values.
     """
     from vinsar.kernels import windows
 
     kind = complex if np.iscomplexobj(values) else float
-    parts = np.ascontiguousarray(values, kind).view(float)
+    parts = np.ascontiguousarray(values, kind).view(float).reshape(len(values), -1)
     found = np.empty(values.shape, kind)
     rows, columns = (
-        _places(size, side, outside) for size, side in zip(values.shape, window_px, strict=True)
+        _places(size, side, outside) for size, side in zip(values.shape[:2], window_px, strict=True)
     )
-    windows.mean(parts, rows, columns, window_px, found.view(float))
+    windows.mean(parts, rows, columns, window_px, found.view(float).reshape(parts.shape))
     return found
 
 
@@ -325,8 +330,7 @@ def smoothing(filter_: response.Response, product: Complexes, *, cells: Cells) -
     signal = mean(product, side)
     amplitude = np.abs(signal)
     spread = [
-        _point_power(float(np.median(part)), step)
-        for part, step in zip(cells.resolution, cells.spacing, strict=True)
+        _point_power(side, step) for side, step in zip(cells.typical, cells.spacing, strict=True)
     ]
 
     start = unit(signal)
@@ -358,7 +362,7 @@ def roughness(filter_: response.Response, product: Complexes, *, cells: Cells) -
         Variance, rad^2; 0 where there is no roughness to be seen.
     """
     spacing, trend = cells.spacing, cells.window(_TREND_LOOKS)
-    cell = float(np.median(cells.resolution[0])), float(np.median(cells.resolution[1]))
+    cell = cells.typical
     seen = product != 0
     if trend == (1, 1) or not seen.any():
         return np.zeros(product.shape)

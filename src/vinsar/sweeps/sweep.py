@@ -459,7 +459,7 @@ def _compute(name: str, setting: dict[str, Any], products: Products) -> xr.Datas
 
 
 def _split_channel(product: xr.Dataset, number: int) -> xr.Dataset:
-    return product.isel(channel=[number]) if "channel" in product.dims else product
+    return product.isel(channel=slice(number, number + 1)) if "channel" in product.dims else product
 
 
 def _join_channels(product: str, parts: list[xr.Dataset]) -> xr.Dataset:
