@@ -20,6 +20,7 @@ from vinsar.kernels import (
     columns,
     functions,
     lookup,
+    matched,
     multilook,
     patches,
     splat,
@@ -52,8 +53,8 @@ def call_fine_phasor(turn, cosine, sine):
 
 
 @kernel
-def call_copy(windows, index, base, table, out0, out1, out2, out3):
-    lookup.copy(windows, index, base, table, (out0, out1, out2, out3))
+def call_add(windows, index, base, weights, cosine, sine, table, real, imag):
+    matched.add(windows, index, base, weights, cosine, sine, table, table, real, imag)
 
 
 @kernel
@@ -77,7 +78,7 @@ def test_the_phasors_err_less_than_they_say(call, limit_db):
 
 @pytest.mark.parametrize(("windows", "reach"), [(1, 2), (1, 14), (2, 30)])
 @pytest.mark.parametrize("base", [40, -3, 980])
-def test_registers_give_the_samples_that_single_copies_give(windows, reach, base):
+def test_registers_give_the_samples_that_lie_at_the_places(windows, reach, base):
     if call_windows(reach, 4) != windows:
         pytest.skip("this machine has other vector registers")
     rng = np.random.default_rng(windows)
@@ -89,12 +90,16 @@ def test_registers_give_the_samples_that_single_copies_give(windows, reach, base
     if base != 40:
         # Places beyond either end give some sample or other: what counts is that it is one.
         index[:] = rng.integers(-(2**31), 2**31, index.size)
-    ways = np.zeros((2, 4, index.size), np.float32)
-    for way, number in zip(ways, (windows, 0), strict=True):
-        call_copy(number, index, np.int64(base), table, *way)
-    if base == 40:
-        np.testing.assert_array_equal(ways[0], ways[1])
-    assert np.isin(ways, table).all()
+    for tap in range(4):
+        # A weight of 1 for one of the four samples, and no turn, leave the sample.
+        weights = tuple(np.full(index.size, float(n == tap), np.float32) for n in range(4))
+        cosine, sine = np.ones(index.size, np.float32), np.zeros(index.size, np.float32)
+        real, imag = np.zeros((2, index.size), np.float32)
+        call_add(windows, index, np.int64(base), weights, cosine, sine, table, real, imag)
+        np.testing.assert_array_equal(real, imag)
+        if base == 40:
+            np.testing.assert_array_equal(real, table[base + index + tap])
+        assert np.isin(real, table).all()
 
 
 @pytest.mark.parametrize("taps", [2, 4])

@@ -144,3 +144,9 @@ def test_coarse_rasters_of_peaks_and_boxes_cast_the_shadows_of_a_march(kind):
     marched = np.array([march(terrain, antenna, points) for antenna in antennas])
     assert 0.5 < marched.mean() < 0.98
     assert (found == marched).mean() > 0.9995
+
+
+def test_points_at_the_antenna_and_behind_it_do_no_harm(terrain):
+    points = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 2.0], [0.0, 10.5, 0.0]])
+    seen = visibility.visible_points(terrain, np.array([[0.0, 0.0, 2.0]]), points)
+    assert seen[0, 2]

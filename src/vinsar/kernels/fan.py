@@ -8,13 +8,17 @@ slope is good to 1e-8, which is a tenth of a micrometre at ten metres.
 from __future__ import annotations
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
+from vinsar.kernels import scratch
 from vinsar.kernels.compiling import helper, kernel
-from vinsar.kernels.lookup import LANES, PADDING, copy, lanes, windows_for
+from vinsar.kernels.lookup import PADDING, Emitter, contiguous, lanes, windows_for
 
 __all__ = ["PADDING", "sweep"]
 
-_CHUNK = 256
 _ZERO = np.float32(0)
 # The slope of a ray without terrain so far: below every other, and finite, so that sums are.
 _OPEN = np.float32(-1e30)
@@ -22,22 +26,69 @@ _OPEN = np.float32(-1e30)
 _CLIFF = 1.0
 
 
+@intrinsic
+def _raise_group(  # type: ignore[no-untyped-def]
+    typingctx, horizon, begin, heights, number, first, step, last, up, inverse
+):
+    """Do what the last loop over rays in `sweep` does for a group of them, from a window."""
+    del typingctx
+    if not contiguous(horizon, heights):
+        return None
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        emit = Emitter(context, builder, signature, arguments)
+        if not emit.has(1):
+            return context.get_dummy_value()
+        rays, at, table = emit.array(0), arguments[1], emit.array(2)
+        number, first, step, last, up, inverse = (emit.repeated([value]) for value in arguments[3:])
+        zero = ir.Constant(emit.floats, [0.0] * emit.lanes)
+        lane = ir.Constant(emit.floats, [float(n) for n in range(emit.lanes)])
+        column = emit.fused(step, builder.fadd(number, lane), first)
+        column = builder.select(builder.fcmp_ordered(">", column, zero), column, zero)
+        column = builder.select(builder.fcmp_ordered("<", column, last), column, last)
+        index = builder.fptosi(column, emit.ints)
+        share = emit.minus(column, builder.sitofp(index, emit.floats))
+        # Columns rise along a group: the window begins at the first one.
+        places = builder.sub(index, emit.shuffled(index, index, [0] * emit.lanes))
+        start = builder.extract_element(index, ir.Constant(ir.IntType(32), 0))
+        here, there = emit.look_up(table, builder.sext(start, at.type), places, 2, 1)
+        z = emit.fused(share, emit.minus(there, here), here)
+        slope = emit.times(emit.minus(z, up), inverse)
+        # Not a choice between the two, of which LLVM makes a masked store: that is slow on AMD's.
+        larger = cgutils.get_or_insert_function(
+            builder.module,
+            ir.FunctionType(emit.floats, [emit.floats, emit.floats]),
+            f"llvm.maxnum.v{emit.lanes}f32",
+        )
+        highest = builder.call(larger, [slope, emit.load(rays, at)], fastmath=("nnan",))
+        emit.store(highest, rays, at)
+        return context.get_dummy_value()
+
+    return types.void(horizon, begin, heights, number, first, step, last, up, inverse), generate
+
+
 @helper
 def _march(  # type: ignore[no-untyped-def]
-    height, last_row, x_first, x_step, near, y_step, antenna, x, y, z
+    height, last_row, highest, x_first, x_step, near, y_step, antenna, x, y, z
 ):
     aside = (x - antenna[0]) / (y - antenna[1])
     slope = (z - antenna[2]) / (y - antenna[1])
     columns = height.shape[1] - PADDING
+    # From row to row the line of sight advances evenly in column and height.
+    first, step = (antenna[0] + aside * near - x_first) / x_step, aside * y_step / x_step
+    z_first, z_step = antenna[2] + slope * near, slope * y_step
+    begin, end = 0, last_row + 1
+    if z_step < 0:
+        # Before this row it is above everything.
+        begin = min(max(begin, int((highest - z_first) / z_step)), end)
     # What hides a point is mostly close before it.
-    for row in range(last_row, -1, -1):
-        distance = near + y_step * row
-        column = (antenna[0] + aside * distance - x_first) / x_step
+    for row in range(end - 1, begin - 1, -1):
+        column = first + step * row
         if 0 <= column <= columns - 1:
             k = np.uint64(column)
             share = column - np.floor(column)
             here, there = height[np.uint64(row), k], height[np.uint64(row), k + np.uint64(1)]
-            if here + share * (there - here) - antenna[2] > slope * distance:
+            if here + share * (there - here) > z_first + z_step * row:
                 return False
     return True
 
@@ -45,12 +96,14 @@ def _march(  # type: ignore[no-untyped-def]
 @kernel
 def sweep(
     height: np.ndarray,
+    highest: float,
     x_first: float,
     x_step: float,
     y_first: float,
     y_step: float,
     antenna: np.ndarray,
     points: np.ndarray,
+    ready: np.ndarray,
     rays: int,
     visible: np.ndarray,
 ) -> None:
@@ -64,41 +117,36 @@ def sweep(
     ----------
     height
         Terrain (row, column), float32, its last column repeated `PADDING` times.
+    highest
+        The largest height of all.
     x_first, x_step, y_first, y_step
         The raster's origin and spacing.
     antenna
         Its position (3,), with a y before the raster's first row.
     points
         Points (3, count), float64, sorted by y.
+    ready
+        Number of points with a y below that of each raster row but the first, of one row more, and
+        of all (row + 1,).
     rays
         Number of rays, at least 2.
     visible
         Output flags (count,).
     """
     rows, columns = height.shape[0], height.shape[1] - PADDING
-    along = points[1]
     x_last = x_first + x_step * (columns - 1)
     y_last = y_first + y_step * (rows - 1)
     near, far = y_first - antenna[1], y_last - antenna[1]
     left = min((x_first - antenna[0]) / near, (x_first - antenna[0]) / far)
     right = max((x_last - antenna[0]) / near, (x_last - antenna[0]) / far)
     ray_step = (right - left) / (rays - 1)
-    rays_per_slope = 1 / ray_step
-    # Whole groups of lanes; whatever is computed for the lanes beyond the last ray is not used.
-    room = (rays + LANES - 1) // LANES * LANES
-    horizon = np.full(room + PADDING, _OPEN, np.float32)
-    index_buffer = np.empty(room, np.int32)
-    fraction_buffer = np.empty(room, np.float32)
-    here_buffer = np.empty(room, np.float32)
-    there_buffer = np.empty(room, np.float32)
-    place = np.empty(_CHUNK, np.int32)
-    slope = np.empty(_CHUNK, np.float32)
-    share = np.empty(_CHUNK, np.float32)
+    horizon = np.full(rays, _OPEN, np.float32)
+    place, share, slope = scratch.integers(), scratch.floats(), scratch.floats()
+    before, after, unclear = scratch.floats(), scratch.floats(), scratch.integers()
+    rays_per_slope, up = 1 / ray_step, np.float32(antenna[2])
     cliff = np.float32(_CLIFF * ray_step)
-    before = np.empty(_CHUNK, np.float32)
-    after = np.empty(_CHUNK, np.float32)
-    unclear = np.empty(_CHUNK, np.bool_)
-    most = np.float32(columns - 1)
+    last = np.float32(columns - 1)
+    permuted = windows_for(0, 2) == 1
     done = 0
     for row in range(-1, rows):
         if row >= 0:
@@ -108,39 +156,38 @@ def sweep(
             # Only rays that cross this row of the raster.
             begin = max(0, int(np.ceil(-first / step)))
             end = min(rays, int(np.floor((columns - 1 - first) / step)) + 1)
-            width = max(0, end - begin + LANES - 1) // LANES * LANES
-            index, fraction = index_buffer[:width], fraction_buffer[:width]
-            here, there = here_buffer[:width], there_buffer[:width]
             origin, stride = np.float32(first + step * begin), np.float32(step)
-            for i in range(width):
-                column = min(max(origin + stride * np.float32(i), _ZERO), most)
-                floor = np.floor(column)
-                fraction[i] = column - floor
-                index[i] = np.int32(floor)
-            windows = windows_for(np.ceil(step * (lanes() // 2)), 2)
-            copy(windows, index, np.int64(0), height[row], (here, there))
-            inverse, up = np.float32(1 / distance), np.float32(antenna[2])
-            line = horizon[begin:]
-            for i in range(end - begin):
-                z = here[i] + fraction[i] * (there[i] - here[i])
-                line[i] = max(line[i], (z - up) * inverse)
+            heights, inverse = height[row], np.float32(1 / distance)
+            ray = begin
+            # As many columns as there are rays in a group lie in a window; a rounding less do.
+            if permuted and step * (lanes() - 1) < lanes() - 1.01:
+                while ray + lanes() <= end:
+                    _raise_group(
+                        horizon, np.int64(ray), heights, np.float32(ray - begin), origin, stride,
+                        last, up, inverse,
+                    )  # fmt: skip
+                    ray += lanes()
+            for i in range(ray, end):
+                column = min(max(origin + stride * np.float32(i - begin), _ZERO), last)
+                k = np.uint64(column)
+                fraction = column - np.floor(column)
+                z = heights[k] + fraction * (heights[k + np.uint64(1)] - heights[k])
+                horizon[i] = max(horizon[i], (z - up) * inverse)
         # Points up to here lie less than a row behind the last row in the horizon.
-        limit = y_first + y_step * (row + 2)
-        ready = done + int(np.searchsorted(along[done:], limit)) if row < rows - 1 else along.size
-        while done < ready:
-            size = min(_CHUNK, ready - done)
+        while done < ready[row + 1]:
+            size = min(scratch.SIZE, ready[row + 1] - done)
             for i in range(size):
-                inverse = 1 / (along[done + i] - antenna[1])
-                ray = ((points[0, done + i] - antenna[0]) * inverse - left) * rays_per_slope
-                floor = min(max(np.floor(ray), 0.0), rays - 2.0)
-                place[i] = np.int32(floor)
-                share[i] = np.float32(min(max(ray - floor, 0.0), 1.0))
-                slope[i] = np.float32((points[2, done + i] - antenna[2]) * inverse)
+                per_metre = 1 / (points[1, done + i] - antenna[1])
+                ray_place = ((points[0, done + i] - antenna[0]) * per_metre - left) * rays_per_slope
+                # Whole numbers are within bounds whatever the point is.
+                place[i] = min(max(np.int32(np.floor(ray_place)), np.int32(0)), np.int32(rays - 2))
+                share[i] = np.float32(min(max(ray_place - place[i], 0.0), 1.0))
+                slope[i] = np.float32((points[2, done + i] - antenna[2]) * per_metre)
             for i in range(size):
                 k = np.uint64(place[i])
                 before[i] = horizon[k]
                 after[i] = horizon[k + np.uint64(1)]
-            some = False
+            some = np.int32(0)
             for i in range(size):
                 a, b = before[i], after[i]
                 visible[done + i] = slope[i] >= a + share[i] * (b - a)
@@ -150,7 +197,7 @@ def sweep(
                 for i in range(size):
                     if unclear[i]:
                         visible[done + i] = _march(
-                            height, row, x_first, x_step, near, y_step, antenna,
-                            points[0, done + i], along[done + i], points[2, done + i],
+                            height, row, highest, x_first, x_step, near, y_step, antenna,
+                            points[0, done + i], points[1, done + i], points[2, done + i],
                         )  # fmt: skip
             done += size

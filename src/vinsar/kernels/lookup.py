@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import config, types
 from numba.core import cgutils
@@ -157,7 +156,7 @@ class Emitter:
         before = ir.Constant(_INT, (size - taps) // 2)
         start = builder.sub(builder.add(middle, origin), before)
         samples = builder.trunc(cgutils.unpack_tuple(builder, table.shape)[0], _INT)
-        most = builder.sub(samples, ir.Constant(_INT, size))
+        most = builder.sub(samples, ir.Constant(_INT, size + taps - 1))
         # Whatever the indices are, no sample is read outside the table.
         below = builder.icmp_signed("<", start, ir.Constant(_INT, 0))
         start = builder.select(below, ir.Constant(_INT, 0), start)
@@ -169,10 +168,17 @@ class Emitter:
     def look_up(self, table: Any, start: Any, places: Any, taps: int, windows: int) -> list[Any]:
         """Return the samples at places in the window, and at the next ones for further taps."""
         builder = self.builder
-        count = windows * (2 if self.permuted == LANES else 1)
+        if self.permuted != LANES:
+            # One register holds the window: each tap has its own, a sample further on.
+            return [
+                self._permuted(
+                    [self.load(table, builder.add(start, ir.Constant(start.type, tap)))], places
+                )
+                for tap in range(taps)
+            ]
         registers = [
             self.load(table, builder.add(start, ir.Constant(start.type, self.lanes * number)))
-            for number in range(count)
+            for number in range(2 * windows)
         ]
         found = []
         for tap in range(taps):
@@ -231,63 +237,3 @@ def contiguous(*arrays: Any) -> bool:
     """Tell whether array types know no strides, as the pointers of `Emitter` do not."""
     kinds = [array.dtype if isinstance(array, types.BaseTuple) else array for array in arrays]
     return all(kind.layout == "C" for kind in kinds)
-
-
-def _window_copier(windows: int) -> Any:
-    @intrinsic
-    def copy_window(typingctx, index, begin, base, table, out):  # type: ignore[no-untyped-def]
-        """Copy ``table[base + index[begin:begin + lanes] + tap]`` to ``out[tap][begin:...]``."""
-        del typingctx
-        if not contiguous(index, table, out):
-            return None
-
-        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            emit = Emitter(context, builder, signature, arguments)
-            if emit.has(windows):
-                begin, samples, taps = arguments[1], emit.array(3), out.count
-                start, places = emit.window(
-                    emit.load(emit.array(0), begin, emit.ints), arguments[2], samples, taps,
-                    windows,
-                )  # fmt: skip
-                for tap, found in enumerate(emit.look_up(samples, start, places, taps, windows)):
-                    emit.store(found, emit.array(4, tap), begin)
-            return context.get_dummy_value()
-
-        return types.void(index, begin, base, table, out), generate
-
-    return copy_window
-
-
-_copy_from_one, _copy_from_two = _window_copier(1), _window_copier(2)
-
-
-@part
-def copy(windows, index, base, table, out):  # type: ignore[no-untyped-def]
-    """Copy ``table[base + index[i] + tap]`` to ``out[tap][i]`` for all i and taps.
-
-    Parameters
-    ----------
-    windows
-        From `windows_for`, for all groups.
-    index
-        Places (count,), int32; unless windows is 0, a multiple of `LANES`.
-    base
-        What to add to them, int64.
-    table
-        Samples, float32, with `PADDING` to spare. A place outside gives some other sample.
-    out
-        An array for each tap, 2 or 4 (count,), float32.
-    """
-    if windows == 1:
-        for begin in range(0, index.size, lanes()):
-            _copy_from_one(index, np.int64(begin), base, table, out)
-    elif windows == 2:
-        for begin in range(0, index.size, lanes()):
-            _copy_from_two(index, np.int64(begin), base, table, out)
-    else:
-        last = table.size - PADDING
-        for i in range(index.size):
-            # Unsigned, so that no negative index needs a look.
-            k = np.uint64(min(max(base + index[i], 0), last))
-            for tap in range(len(out)):
-                out[tap][i] = table[k + np.uint64(tap)]

@@ -121,15 +121,19 @@ def _looking(
         raise ValueError("an antenna or a point is at a position that is not a number")
     if np.any(np.diff(points[:, 1]) < 0):
         raise ValueError("the points are not sorted by y")
+    x_step, y_step = x[1] - x[0], y[1] - y[0]
     columns = np.ascontiguousarray(points.T, dtype=float)
+    ready = np.searchsorted(points[:, 1], y[0] + y_step * np.arange(1, y.size + 2))
+    ready[-1] = len(points)
     # Rays a raster cell apart at the far edge, where they are widest apart.
     spread = (x[-1] - x[0]) / (y[0] - antennas[:, 1].max())
-    spacing = (x[1] - x[0]) / (y[-1] - antennas[:, 1].min())
+    spacing = x_step / (y[-1] - antennas[:, 1].min())
     rays = max(_FEWEST_RAYS, int(np.ceil(spread / spacing)) + 1)
+    highest = float(height.max())
 
     def look(antenna: Floats, visible: Flags) -> None:
         fan.sweep(
-            height, x[0], x[1] - x[0], y[0], y[1] - y[0], antenna, columns, rays, visible
+            height, highest, x[0], x_step, y[0], y_step, antenna, columns, ready, rays, visible
         )  # fmt: skip
 
     return look
@@ -214,13 +218,14 @@ def visible_share(terrain: xr.Dataset, trajectory: xr.Dataset, points: Floats) -
         From 0 to 1.
     """
     channels, positions = trajectory["transmitter"].shape[:2]
-    counts = np.zeros((channels, len(points)), dtype=np.uint32)
+    # Bytes, if they hold so many, are added far faster.
+    counts = np.zeros((channels, len(points)), dtype=np.min_scalar_type(positions))
     turn = threading.Lock()
 
     def take(channel: int, position: int, flags: Flags) -> None:
         del position
         with turn:
-            counts[channel] += flags
+            counts[channel] += flags.view(np.uint8)
 
     _each_channel(terrain, trajectory, points, take)
     return counts / positions
