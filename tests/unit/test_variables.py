@@ -31,6 +31,16 @@ def test_a_dataset_has_the_declared_dimensions_attributes_and_coordinates():
     variables.check(data, "terrain")
 
 
+def test_attributes_of_one_dataset_are_its_owner_s():
+    data = terrain()
+    for name in ("height", "x"):
+        data[name].attrs["units"] = "furlong"
+    data.attrs["title"] = "mine"
+    again = terrain()
+    assert (again["height"].attrs["units"], again["x"].attrs["units"]) == ("m", "m")
+    assert again.attrs == {}
+
+
 def test_labels_and_counts_are_filled_in():
     data = variables.dataset(
         "trajectory", {name: np.zeros((2, 4, 3)) for name in ("transmitter", "receiver")}

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
-    from xarray.core.indexes import Index
-
-    _Coordinate = tuple[xr.Variable, Index]
 
 Kind = Literal["real", "complex", "integer", "flag", "label"]
 
@@ -187,7 +184,7 @@ def dataset(
         If a variable is missing, undeclared, or of other shape or type than declared.
     """
     declared = PRODUCTS[product]
-    contents: dict[str, Any] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
     for name, values in data.items():
         if name not in declared:
@@ -199,23 +196,47 @@ def dataset(
                 f"'{name}' of product '{product}' has {array.ndim} dimensions, "
                 f"but {dims} are declared"
             )
-        contents[name] = (dims, array, declared[name].attrs)
+        arrays[name] = array
         sizes |= dict(zip(dims, array.shape, strict=True))
-    labels: dict[str, Any] = {}
     # In one order, so that a dataset written twice is the same bytes.
-    for name in sorted(sizes):
-        if coords is not None and name in coords:
-            values = np.asarray(coords[name])
-        else:
-            values = _labels(name, sizes[name])
-        labels[name] = _coordinate(name, values)
+    labels = {
+        name: np.asarray(coords[name])
+        if coords is not None and name in coords
+        else _labels(name, sizes[name])
+        for name in sorted(sizes)
+    }
+    if product in _CHECKS or any(values.size > _LONG_AXIS for values in labels.values()):
+        return _assemble(product, arrays, labels)
+    kinds = tuple((name, array.dtype.str, array.shape) for name, array in arrays.items())
+    axes = tuple((name, values.dtype.str, values.tobytes()) for name, values in labels.items())
+    return _template(product, kinds, axes).copy(data=arrays)
+
+
+# Labelling costs several times as much as a copy with other values, and stages make the same
+# products again and again.
+@lru_cache(maxsize=128)
+def _template(
+    product: str,
+    kinds: tuple[tuple[str, str, tuple[int, ...]], ...],
+    axes: tuple[tuple[str, str, bytes], ...],
+) -> xr.Dataset:
+    """Return a product of some types and shapes on some axes; its values take no memory."""
+    arrays = {name: np.broadcast_to(np.zeros((), dtype), shape) for name, dtype, shape in kinds}
+    labels = {name: np.frombuffer(data, dtype).copy() for name, dtype, data in axes}
+    return _assemble(product, arrays, labels)
+
+
+def _assemble(
+    product: str, arrays: Mapping[str, NDArray[Any]], labels: Mapping[str, NDArray[Any]]
+) -> xr.Dataset:
+    """Return a product from its arrays and the values of its axes, all as declared."""
+    declared, axes = PRODUCTS[product], COORDINATES
     result = xr.Dataset(
-        contents,
-        xr.Coordinates(
-            # Copies, because a dataset's owner may change its attributes.
-            {name: variable.copy(deep=False) for name, (variable, _) in labels.items()},
-            {name: index for name, (_, index) in labels.items()},
-        ),
+        {
+            name: (declared[name].dims, values, declared[name].attrs)
+            for name, values in arrays.items()
+        },
+        xr.Coordinates({name: (name, values, axes[name].attrs) for name, values in labels.items()}),
     )
     check(result, product)
     return result
@@ -225,23 +246,6 @@ def _labels(name: str, size: int) -> NDArray[Any]:
     if name == "channel":
         return np.asarray(channel_names(size))
     return np.asarray(LABELS[name]) if name in LABELS else np.arange(size)
-
-
-def _coordinate(name: str, values: NDArray[Any]) -> _Coordinate:
-    # Making an index costs more than all else here, and the same few axes come again and again.
-    if values.size > _LONG_AXIS:
-        return _make_coordinate(name, values)
-    return _remembered_coordinate(name, values.dtype.str, values.tobytes())
-
-
-@lru_cache(maxsize=128)
-def _remembered_coordinate(name: str, dtype: str, data: bytes) -> _Coordinate:
-    return _make_coordinate(name, np.frombuffer(data, dtype).copy())
-
-
-def _make_coordinate(name: str, values: NDArray[Any]) -> _Coordinate:
-    made = xr.Coordinates({name: (name, values, COORDINATES[name].attrs)})
-    return made.variables[name], made.xindexes[name]
 
 
 def swept(data: xr.Dataset, *dims: str) -> xr.Dataset:
