@@ -240,7 +240,9 @@ def test_the_variance_of_the_phase_is_that_of_positions_nobody_corrects(rail):
     displacement *= std / displacement.std(axis=1, keepdims=True)
     product = motion_product(displacement, np.zeros((2, count, 3)))
     instrument = Instrument.of(rail, FREQUENCY)
-    told = assessment.motion_variance(product, instrument, REFERENCE, x, y).ravel()
+    told = assessment.motion_variance(
+        product, instrument.over(x[None, :], y[:, None]), REFERENCE
+    ).ravel()
     assert told[0] == 0
     # The variance of 1500 draws is known to 4 %; the two channels of 81 positions correlate to a
     # ninth by chance, which changes their difference's as much. Three times both.
@@ -252,7 +254,7 @@ def test_positions_of_which_nothing_is_known_leave_no_phase(rail):
     product = motion_product(np.zeros(unknown.shape), unknown)
     instrument = Instrument.of(rail, FREQUENCY)
     axis = np.array([10.0, 11.0])
-    told = assessment.motion_variance(product, instrument, REFERENCE, axis - 10, axis)
+    told = assessment.motion_variance(product, instrument.over(axis - 10, axis[:, None]), REFERENCE)
     assert told == uncertainty.UNIFORM
 
 

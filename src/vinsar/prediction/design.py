@@ -507,7 +507,7 @@ class Sheet:
                 line = target - mine
                 path -= line @ direction / np.linalg.norm(line, axis=-1)
         # The difference of the assumed paths, lower less upper, has to equal the measured one.
-        return self.instrument.height_per_difference(x, y) * path
+        return self.instrument.over(x, y).height_per_difference * path
 
     def _reference(self) -> tuple[Floats, Floats]:
         """Return points that fix the phase constant: corners of level ground, or control points."""

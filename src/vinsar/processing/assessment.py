@@ -11,7 +11,7 @@ import numpy as np
 from vinsar.processing import classification, masks, uncertainty
 from vinsar.processing.filtering import response_to
 from vinsar.radar import aperture, grid, waveform
-from vinsar.radar.instrument import Instrument
+from vinsar.radar.instrument import Ground, Instrument
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -122,7 +122,8 @@ def assess(
     antennas = instrument.lower, instrument.upper
     flat = aperture.flat_earth_phase(*antennas, across, ahead, instrument.wavelength)
     widening = np.array([_noise_width(name) for name in windows[::-1]])
-    resolution = instrument.resolution(across, ahead) * widening[:, None, None]
+    ground = instrument.over(across, ahead)
+    resolution = ground.resolution * widening[:, None, None]
     cells = uncertainty.Cells(resolution, (grid.step(x), grid.step(y)))
     pictures = np.nan_to_num(images["image"].values)
     product, smooth = (
@@ -148,11 +149,11 @@ def assess(
         terrain = np.maximum(terrain, rough)
     own = np.minimum(by_noise + terrain, uncertainty.UNIFORM)
     shared = _reference_variance(reference, noise, product, own, x, y, cells)
-    shared = shared + motion_variance(motion, instrument, reference, x, y)
-    per_difference = instrument.height_per_difference(across, ahead)
+    shared = shared + motion_variance(motion, ground, reference)
+    per_difference = ground.height_per_difference
     ambiguity = np.abs(instrument.wavelength * per_difference)
     per_phase = ambiguity / (2 * np.pi)
-    drift = _drift(instrument, x, y)
+    drift = ground.drift
     # Interpolation between two pixels along y averages their noise.
     share = np.where(np.isfinite(true_y), (true_y - ahead) / cells.spacing[1], 0.0) % 1
     alike = filter_.neighbours(noise.decorrelation, cells.spacing)
@@ -258,13 +259,6 @@ def _noise_width(name: waveform.WindowName) -> float:
     return float(_WEIGHTS * (power**2).sum() / power.sum() ** 2)
 
 
-def _drift(instrument: Instrument, x: Floats, y: Floats) -> Floats:
-    """Return how a pixel's target moves in x and in y as its height rises (2, y, x), m/m."""
-    length, slope = aperture.gradients(instrument.lower, x[None, :], y[:, None])
-    along = aperture.cross(length, slope)
-    return np.asarray(along[:2] / along[2])
-
-
 def _at_one_place(drift: Floats, height: Floats, cells: uncertainty.Cells) -> Floats:
     """Return the error at a place over that of a pixel, which moves with its height (y, x)."""
     known = np.isfinite(height)
@@ -306,9 +300,7 @@ def _reference_variance(
     return np.asarray(np.einsum("yxi,ij,yxj->yx", places, covariance, places))
 
 
-def motion_variance(
-    motion: xr.Dataset, instrument: Instrument, reference: Reference, x: Floats, y: Floats
-) -> Floats | float:
+def motion_variance(motion: xr.Dataset, ground: Ground, reference: Reference) -> Floats | float:
     """Return the variance of the phase by what autofocus leaves (y, x), rad^2.
 
     The image's steps measure how positions depart from their mean. A constant difference between
@@ -323,11 +315,11 @@ def motion_variance(
     if not square.any():
         return 0.0
     # The path grows with a target's displacement as it falls with the antennas'.
-    path = aperture.gradients(instrument.lower, x[None, :], y[:, None])[0]
+    path = ground.gradients[0]
     pieces = [path[:, rows, columns].mean(axis=(1, 2)) for rows, columns in reference.rectangles]
     if pieces:
         path = path - np.mean(pieces, axis=0)[:, None, None]
-    wave = 2 * np.pi / instrument.wavelength
+    wave = 2 * np.pi / ground.instrument.wavelength
     return np.asarray(wave**2 * np.einsum("iyx,i->yx", path**2, square) / found.shape[1])
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,61 @@ _MOST_STEPS = 8
 
 # Steps to the baseline of a height of ambiguity, which is nearly inverse to it.
 _STEPS = 8
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Points of the ground plane as an instrument sees them.
+
+    Attributes
+    ----------
+    instrument
+        The instrument.
+    x, y
+        Points, m, of shapes that broadcast.
+    """
+
+    instrument: Instrument
+    x: ArrayLike
+    y: ArrayLike
+
+    @cached_property
+    def gradients(self) -> tuple[Floats, Floats]:
+        """Gradients of the lower aperture's path and slope, each (3, ...), m/m."""
+        return aperture.gradients(self.instrument.lower, self.x, self.y)
+
+    @property
+    def resolution(self) -> Floats:
+        """Resolution in x and y (2, ...), m.
+
+        In y the path's cell ``c / W`` over the path's derivative by y; in x the wavelength over
+        the derivative by x of the path's change along the aperture. On a rail that is
+        ``lambda r / 2L`` over the squared cosine of the squint, by which the aperture shortens and
+        the angle turns; with one end that stands still, twice as much.
+        """
+        path, slope = self.gradients
+        across = self.instrument.wavelength / slope[0]
+        return np.abs(np.stack([across, 2 * self.instrument.range_resolution / path[1]]))
+
+    @cached_property
+    def _rising(self) -> Floats:
+        """Direction in which a target rises and keeps its pixel, ``grad path_1 x grad slope_1``."""
+        return aperture.cross(*self.gradients)
+
+    @property
+    def drift(self) -> Floats:
+        """How a pixel's target moves in x and in y as its height rises (2, ...), m/m."""
+        return np.asarray(self._rising[:2] / self._rising[2])
+
+    @property
+    def height_per_difference(self) -> Floats:
+        """Derivative of the height by the difference of the paths, lower less upper, m/m.
+
+        A target moves with its height along ``t = grad path_1 x grad slope_1``, which keeps it in
+        its pixel; the difference changes by ``-(t . grad path_2) / t_z`` for each metre.
+        """
+        other, _ = aperture.gradients(self.instrument.upper, self.x, self.y)
+        return np.asarray(-self._rising[2] / (self._rising * other).sum(axis=0))
 
 
 @dataclass(frozen=True)
@@ -147,26 +203,13 @@ class Instrument:
         """Return the look angle from nadir at the lower aperture's centre, rad."""
         return geometry.look_angle(self.lower.center, x, y)
 
+    def over(self, x: ArrayLike, y: ArrayLike) -> Ground:
+        """Return points of the ground plane, m, of shapes that broadcast, as it sees them."""
+        return Ground(self, x, y)
+
     def resolution(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Return the resolution on the ground plane in x and y.
-
-        In y the path's cell ``c / W`` over the path's derivative by y; in x the wavelength over
-        the derivative by x of the path's change along the aperture. On a rail that is
-        ``lambda r / 2L`` over the squared cosine of the squint, by which the aperture shortens and
-        the angle turns; with one end that stands still, twice as much.
-
-        Parameters
-        ----------
-        x, y
-            Points, m, of shapes that broadcast.
-
-        Returns
-        -------
-        ndarray, shape (2, ...)
-            Resolution in x and y, m.
-        """
-        path, slope = aperture.gradients(self.lower, x, y)
-        return np.abs(np.stack([self.wavelength / slope[0], 2 * self.range_resolution / path[1]]))
+        """Return the resolution at points of the ground plane in x and y (2, ...), m."""
+        return self.over(x, y).resolution
 
     def looks(self, side_m: float, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the independent looks of a square window: its area in resolution cells.
@@ -186,24 +229,13 @@ class Instrument:
         across, ahead = self.resolution(x, y)
         return np.maximum(1.0, side_m**2 / (across * ahead))
 
-    def height_per_difference(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Return the height's derivative by the difference of the paths, lower less upper, m/m.
-
-        A target moves with its height along ``t = grad path_1 x grad slope_1``, which keeps it in
-        its pixel; the difference changes by ``-(t . grad path_2) / t_z`` for each metre.
-        """
-        length, slope = aperture.gradients(self.lower, x, y)
-        other, _ = aperture.gradients(self.upper, x, y)
-        along = aperture.cross(length, slope)
-        return np.asarray(-along[2] / (along * other).sum(axis=0))
-
     def height_of_ambiguity(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Return the height that turns the phase of a pixel by a cycle, m, without its sign.
 
         On a rail with a vertical baseline that is ``lambda r2 / 2B``; with one end of the path
         common to both channels, twice as much.
         """
-        return np.abs(self.wavelength * self.height_per_difference(x, y))
+        return np.abs(self.wavelength * self.over(x, y).height_per_difference)
 
     def scaled(self, factor: float) -> Instrument:
         """Return the instrument with so many times the baseline, in the same attitude."""
