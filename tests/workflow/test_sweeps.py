@@ -25,11 +25,11 @@ sweeps:
     over:
       motion.level_wavelengths: [0.0, 0.1, 0.2, 0.5]
       filtering.goldstein_alpha: [0.2, 0.8]
-    realizations: 10
+    realizations: 4
     base: {}
 dask: {scheduler: processes, address: null}
 """
-CASES = 80
+CASES = 32
 # For machines on which much else runs.
 PATIENCE = 300
 
@@ -179,7 +179,7 @@ def test_failed_cases_are_named_and_only_they_are_computed_after_mending(fresh, 
     solver.write_text("def unwrap(*_, **__):\n    raise ValueError('no licence')\n")
     code, said = fresh.run(PYTHONPATH=path)
     assert code == 1
-    assert "40 of 80 cases of the sweep 'quick' failed" in said
+    assert "16 of 32 cases of the sweep 'quick' failed" in said
     assert "level_wavelengths = 0.1, unwrapping.method = snaphu, realization 0: ValueError" in said
     assert "Traceback (" not in said
     assert not fresh.output.exists()
@@ -189,7 +189,7 @@ def test_failed_cases_are_named_and_only_they_are_computed_after_mending(fresh, 
     )
     code, said = fresh.run(PYTHONPATH=path)
     assert code == 0, said
-    assert finished_before(fresh.log()) == 40
+    assert finished_before(fresh.log()) == 16
 
 
 @pytest.mark.skipif(importlib.util.find_spec("snaphu") is not None, reason="snaphu is installed")
@@ -240,7 +240,7 @@ def can_mount():
     ("size", "file"), [("4k", r"\.quick\.jsonl: No space left on device"), ("24k", r"quick\.nc")]
 )
 def test_a_full_disk_is_said_and_leaves_nothing_half_written(fresh, size, file):
-    few = SWEEP.replace("realizations: 10", "realizations: 1").replace("processes", "threads")
+    few = SWEEP.replace("realizations: 4", "realizations: 1").replace("processes", "threads")
     fresh.set(few)
     code, said = fresh.run("unshare", "-rm", "sh", "-c", ON_A_SMALL_DISK, size)
     assert code == 1, said

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.colors import Colormap
+    from numpy.typing import NDArray
 
 _PREFIX, _REVERSED, _CATEGORICAL = "cmc.", "_r", "S"
 
@@ -45,6 +49,7 @@ def find(name: str) -> Colormap:
     return matplotlib.colormaps[name]
 
 
+@cache
 def _crameri() -> dict[str, Path]:
     """Return the tables of Fabio Crameri's maps by name.
 
@@ -63,8 +68,12 @@ def _crameri() -> dict[str, Path]:
 
 
 def _read(table: Path, *, reverse: bool) -> Colormap:
-    import numpy as np
     from matplotlib.colors import ListedColormap
 
-    found = ListedColormap(np.loadtxt(table), name=table.stem)
+    found = ListedColormap(_colours(table), name=table.stem)
     return found.reversed() if reverse else found
+
+
+@cache
+def _colours(table: Path) -> NDArray[np.floating]:
+    return np.loadtxt(table)

@@ -184,7 +184,7 @@ def dataset(
         If a variable is missing, undeclared, or of other shape or type than declared.
     """
     declared = PRODUCTS[product]
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, xr.Variable] = {}
     sizes: dict[str, int] = {}
     for name, values in data.items():
         if name not in declared:
@@ -196,7 +196,7 @@ def dataset(
                 f"'{name}' of product '{product}' has {array.ndim} dimensions, "
                 f"but {dims} are declared"
             )
-        arrays[name] = array
+        arrays[name] = _variable(dims, array, declared[name].attrs)
         sizes |= dict(zip(dims, array.shape, strict=True))
     # In one order, so that a dataset written twice is the same bytes.
     labels = {
@@ -221,25 +221,36 @@ def _template(
     axes: tuple[tuple[str, str, bytes], ...],
 ) -> xr.Dataset:
     """Return a product of some types and shapes on some axes; its values take no memory."""
-    arrays = {name: np.broadcast_to(np.zeros((), dtype), shape) for name, dtype, shape in kinds}
+    arrays = {
+        name: _variable(
+            PRODUCTS[product][name].dims,
+            np.broadcast_to(np.zeros((), dtype), shape),
+            PRODUCTS[product][name].attrs,
+        )
+        for name, dtype, shape in kinds
+    }
     labels = {name: np.frombuffer(data, dtype).copy() for name, dtype, data in axes}
     return _assemble(product, arrays, labels)
 
 
 def _assemble(
-    product: str, arrays: Mapping[str, NDArray[Any]], labels: Mapping[str, NDArray[Any]]
+    product: str, arrays: Mapping[str, xr.Variable], labels: Mapping[str, NDArray[Any]]
 ) -> xr.Dataset:
-    """Return a product from its arrays and the values of its axes, all as declared."""
-    declared, axes = PRODUCTS[product], COORDINATES
-    result = xr.Dataset(
-        {
-            name: (declared[name].dims, values, declared[name].attrs)
-            for name, values in arrays.items()
-        },
-        xr.Coordinates({name: (name, values, axes[name].attrs) for name, values in labels.items()}),
-    )
+    """Return a product from its variables and the values of its axes, all as declared."""
+    axes = {
+        name: _variable((name,), values, COORDINATES[name].attrs) for name, values in labels.items()
+    }
+    result = xr.Dataset(arrays, xr.Coordinates(axes))
     check(result, product)
     return result
+
+
+def _variable(
+    dims: tuple[str, ...], array: NDArray[Any], attributes: Mapping[str, Any]
+) -> xr.Variable:
+    # Known to be an array: otherwise xarray loads all of Dask to ask whether it is one of Dask's,
+    # which is half a second of each start of the workflow.
+    return xr.Variable(dims, array, attributes, fastpath=True)
 
 
 def _labels(name: str, size: int) -> NDArray[Any]:

@@ -432,14 +432,19 @@ class Instrument:
 
         By the shortest wavelength; infinite if no two targets are ambiguous.
         """
-        from scipy.optimize import brentq
 
-        def excess(width: float) -> float:
+        def images_once(width: float) -> bool:
             left, right = self.growth(x + width * np.array([-0.5, 0.5]), y)
-            return float(abs(right - left)) - self.shortest_wavelength
+            return bool(abs(right - left) <= self.shortest_wavelength)
 
-        widest = 1e4
-        return float(brentq(excess, 0.0, widest)) if excess(widest) > 0 else math.inf
+        # Not by SciPy's search: every start of the workflow would wait to load it.
+        once, twice = 0.0, 1e4
+        if images_once(twice):
+            return math.inf
+        for _ in range(_BISECTIONS):
+            width = (once + twice) / 2
+            once, twice = (width, twice) if images_once(width) else (once, width)
+        return once
 
 
 def settles(ratio: float, phase_std: float) -> bool:

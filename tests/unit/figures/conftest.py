@@ -53,14 +53,15 @@ SMALL = {
 def make_study():
     """Make the paper's study with other values in some sections, and with every study's sweeps."""
 
+    paper = yaml.safe_load((CONFIG / "paper.yaml").read_text(encoding="utf-8"))
+    for path in sorted(CONFIG.glob("*.yaml")):
+        others = yaml.safe_load(path.read_text(encoding="utf-8")).get("sweeps", {})
+        paper["sweeps"] = others | paper["sweeps"]
+
     def make(**sections):
-        values = yaml.safe_load((CONFIG / "paper.yaml").read_text(encoding="utf-8"))
-        for path in sorted(CONFIG.glob("*.yaml")):
-            others = yaml.safe_load(path.read_text(encoding="utf-8")).get("sweeps", {})
-            values["sweeps"] = others | values["sweeps"]
-        for name, section in sections.items():
-            values[name] |= section
-        return StudyModel.model_validate(values)
+        return StudyModel.model_validate(
+            paper | {name: paper[name] | section for name, section in sections.items()}
+        )
 
     return make
 
