@@ -24,7 +24,6 @@ from vinsar.kernels import (
     multilook,
     patches,
     splat,
-    windows,
 )
 from vinsar.kernels.compiling import kernel
 from vinsar.processing import filtering, focusing
@@ -371,16 +370,6 @@ def test_powers_err_less_than_they_say(exponent):
     assert (np.abs(found / exact - 1) < 3e-7 * (1 - np.log2(exact))).all()
     call_power(np.float32([0, 1e-39]), exponent, found[:2])
     assert (found[:2] == 0).all()
-
-
-def test_phases_of_many_cycles_are_rotated_in_single_precision():
-    phase = np.random.default_rng(3).uniform(-1e5, 1e5, 10_000)
-    phase[0] = np.nan
-    found = np.empty(phase.size, np.complex64)
-    windows.rotation(phase, found)
-    assert np.isnan(found[0])
-    # Errors below -124 dB, and the rounding of what is left of a cycle to single precision.
-    assert np.abs(found - np.exp(-1j * phase))[1:].max() < 10 ** (-124 / 20) + np.pi * 2**-24
 
 
 @pytest.mark.parametrize("holes", [0.0, 0.3])

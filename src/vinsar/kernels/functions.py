@@ -1,4 +1,4 @@
-"""Functions that loops over single-precision numbers evaluate, in a form that vectorises."""
+"""Functions that loops evaluate, mostly in single precision, in a form that vectorises."""
 
 from __future__ import annotations
 
@@ -42,6 +42,12 @@ _E2 = np.float32(0.2402211972398715)
 _E3 = np.float32(0.05550713275787338)
 _E4 = np.float32(0.00967554132854452)
 _E5 = np.float32(0.0013276471252404304)
+# atan(t) / t in powers of t^2 on |t| <= tan(pi / 8): errors below 2e-15.
+_A0, _A1, _A2 = 0.9999999999999997, -0.33333333333210663, 0.19999999977383892
+_A3, _A4, _A5 = -0.14285712628853892, 0.11111048381739347, -0.0908952721842443
+_A6, _A7, _A8 = 0.07673539065407259, -0.06506106895734384, 0.05025322875622525
+_A9 = -0.025324847527954004
+_EIGHTH = float(np.sqrt(2) - 1)
 # A single-precision number: 23 bits of fraction below the exponent, whose zero is 127.
 _FRACTION_BITS, _FRACTION, _EXPONENT_ZERO = np.int32(23), np.int32(0x7FFFFF), np.int32(127)
 _ROOT_HALF = np.float32(np.sqrt(0.5)).view(np.int32)
@@ -100,3 +106,22 @@ def power(base: Any, exponent: Any) -> Any:
     value = _E0 + t * (_E1 + t * (_E2 + t * (_E3 + t * (_E4 + t * _E5))))
     scale = np.int32((np.int32(nearest) + _EXPONENT_ZERO) << _FRACTION_BITS).view(np.float32)
     return value * scale if base >= _LEAST else np.float32(0)
+
+
+@part
+def angle(real: Any, imag: Any) -> Any:
+    """Return the angle of a complex number in double precision, rad; 0 for 0."""
+    across, up = abs(real), abs(imag)
+    steep = up > across
+    less, more = (across, up) if steep else (up, across)
+    # Beyond an eighth of a turn's tangent, from the diagonal: one division for both.
+    diagonal = less > _EIGHTH * more
+    over, under = (less - more, less + more) if diagonal else (less, more)
+    t = over / under if under != 0 else over
+    q = t * t
+    high = _A5 + q * (_A6 + q * (_A7 + q * (_A8 + q * _A9)))
+    value = t * (_A0 + q * (_A1 + q * (_A2 + q * (_A3 + q * (_A4 + q * high)))))
+    value += np.pi / 4 if diagonal else 0.0
+    value = np.pi / 2 - value if steep else value
+    value = np.pi - value if real < 0 else value
+    return -value if imag < 0 else value

@@ -1,11 +1,10 @@
-"""Means over windows of an image, and rotations of its phase."""
+"""Means over windows of an image."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vinsar.kernels.compiling import kernel
-from vinsar.kernels.functions import fine_phasor
 
 # Rows that are averaged along x at once.
 _ROWS = 8
@@ -76,21 +75,3 @@ def mean(
             for column in range(across):
                 for part in range(parts):
                     out[begin + row, column * parts + part] = means[column, row * parts + part]
-
-
-@kernel
-def rotation(phase: np.ndarray, out: np.ndarray) -> None:
-    """Return exp(-i phase).
-
-    Parameters
-    ----------
-    phase
-        Phases of whatever size (n,), rad, float64.
-    out
-        Output (n,), complex64; NaN where the phase is not finite.
-    """
-    parts = out.view(np.float32)
-    for n in range(phase.size):
-        turn = phase[n] / (2 * np.pi)
-        cosine, sine = fine_phasor(np.float32(turn - np.rint(turn)))
-        parts[2 * n], parts[2 * n + 1] = cosine, -sine

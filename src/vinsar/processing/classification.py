@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vinsar.processing import uncertainty
+from vinsar.processing import phases, uncertainty
 from vinsar.radar import aperture, grid
 
 if TYPE_CHECKING:
@@ -200,14 +200,14 @@ def split_band(
     for image, part in zip(images, antennas, strict=True):
         # In y a pixel turns by the carrier's path; without that the band lies around 0.
         path = aperture.path(part, x[None, :], y[:, None])
-        carrier = _phasor(2 * np.pi / wavelength_m * path)
+        carrier = phases.rotation(2 * np.pi / wavelength_m * path)
         parts.append(
             _outer_thirds(image * carrier, spacing[1], resolution[1].mean(axis=0), carrier)
         )
     # Of each third the product, and both powers.
     thirds = np.empty((*phase.shape, 2, 4))
     for number, (lower, upper, share) in enumerate(zip(*parts, shares, strict=True)):
-        turned = lower * np.conj(upper) * _phasor(phase * (1 + share))
+        turned = lower * np.conj(upper) * phases.rotation(phase * (1 + share))
         for kind, values in enumerate((turned.real, turned.imag, _power(lower), _power(upper))):
             thirds[..., number, kind] = values
     turn = 2 * np.pi * float(shares[1] - shares[0])
@@ -223,22 +223,13 @@ def split_band(
         squared = (real**2 + imag**2) / np.maximum(powers[0] * powers[1], _TINY)
         squared = np.clip(squared, 0.02**2, 0.9999**2)
         variance = ((1 - squared) / squared).sum(axis=0) / (2 * np.maximum(count * covered, 1))
-        lacking = np.angle(sums[1] * np.conj(sums[0])) / turn
+        lacking = phases.angle(sums[1] * np.conj(sums[0])) / turn
         result.append(Cycles(lacking if rising else -lacking, np.sqrt(variance) / turn))
     return result
 
 
 def _power(values: Complexes) -> Floats:
     return np.asarray(values.real**2 + values.imag**2)
-
-
-def _phasor(phase: Floats) -> NDArray[np.complex64]:
-    """Return exp(-i phase) in single precision, which a phase of many cycles needs only after."""
-    from vinsar.kernels import windows
-
-    found = np.empty(phase.shape, np.complex64)
-    windows.rotation(np.ascontiguousarray(phase).ravel(), found.ravel())
-    return found
 
 
 def _outer_thirds(

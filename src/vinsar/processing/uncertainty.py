@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from vinsar.processing import response
+from vinsar.processing import phases, response
 from vinsar.radar.decorrelation import Decorrelation
 
 if TYPE_CHECKING:
@@ -167,11 +167,6 @@ def slopes(values: Floats, spacing: Spacing) -> Floats:
     return found
 
 
-def unit(values: Complexes) -> Complexes:
-    """Return complex values of the same phase and of magnitude 1; 0 where there is nothing."""
-    return np.asarray(values / np.maximum(np.abs(values), _TINY))
-
-
 @dataclass(frozen=True)
 class Noise:
     """The noise of an interferogram before any filter.
@@ -224,7 +219,7 @@ def estimate(
     ratio = np.sqrt(np.maximum(powers[0], _TINY) / np.maximum(powers[1], _TINY))
     power = np.sqrt(np.maximum(powers[0] * powers[1], _TINY))
     product = images[0] * np.conj(images[1])
-    along = (product * np.conj(unit(mean(product, narrow)))).real
+    along = (product * np.conj(phases.unit(mean(product, narrow)))).real
     both = (np.abs(images[0]) ** 2 / ratio + np.abs(images[1]) ** 2 * ratio) / 2
     difference = np.maximum(mean(both - along, wide), 0) / power
     looks = np.maximum(1.0, cells.extent(narrow) / (resolution[0] * resolution[1]))
@@ -333,9 +328,9 @@ def smoothing(filter_: response.Response, product: Complexes, *, cells: Cells) -
         _point_power(side, step) for side, step in zip(cells.typical, cells.spacing, strict=True)
     ]
 
-    start = unit(signal)
+    start = phases.unit(signal)
     again = filter_.apply(_blur(amplitude * start, *spread).astype(np.complex64))
-    return np.asarray(mean(np.angle(again * np.conj(start)), side), float)
+    return np.asarray(mean(phases.angle(again * np.conj(start)), side), float)
 
 
 def roughness(filter_: response.Response, product: Complexes, *, cells: Cells) -> Floats:
@@ -366,12 +361,12 @@ def roughness(filter_: response.Response, product: Complexes, *, cells: Cells) -
     seen = product != 0
     if trend == (1, 1) or not seen.any():
         return np.zeros(product.shape)
-    around = product * np.conj(unit(mean(product, trend)))
-    few = np.angle(mean(around, cells.window(PHASE_LOOKS)))
+    around = product * np.conj(phases.unit(mean(product, trend)))
+    few = phases.angle(mean(around, cells.window(PHASE_LOOKS)))
     # Walls and steep slopes are no roughness.
     usual = np.abs(few) < _STANDS_OUT * float(np.median(np.abs(few[seen]))) / _MEDIAN_OF_NORMAL
     left = np.where(usual, product, 0)
-    around = left * np.conj(unit(mean(left, trend)))
+    around = left * np.conj(phases.unit(mean(left, trend)))
     across, amplitude = around.imag, np.abs(around)
     reach = [max(1, round(_REACH_LAGS * cell[0] / step)) for step in spacing]
     lags = _Lags(product.shape, 2 * max(reach))
@@ -510,5 +505,5 @@ def reference_variance(
     ratio = float(noise.power[where].mean() / max(np.abs(part.mean()), _TINY))
     left = ratio * response.rectangle_gain(here, part.shape, spacing)
     seen = ratio * response.rectangle_gain(here, side, spacing)
-    residual = np.angle(part * np.conj(unit(part.mean())))
+    residual = phases.angle(part * np.conj(phases.unit(part.mean())))
     return float(min(left + max(0.0, float(residual.var()) - seen), UNIFORM))

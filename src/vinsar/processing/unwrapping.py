@@ -14,7 +14,7 @@ from vinsar.foundations.configuration import Section, key
 from vinsar.foundations.errors import Fault
 from vinsar.foundations.stage import Stage
 from vinsar.foundations.variables import GRID, Variable
-from vinsar.processing import cycles, interferogram, masks
+from vinsar.processing import cycles, interferogram, masks, phases
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -212,11 +212,11 @@ def unwrap(
         raise ValueError(f"no unwrapper '{method}'; there are {', '.join(UNWRAPPERS)}")
     values = filtered["interferogram"].values
     known = np.isfinite(values) & (values != 0)
-    wrapped = np.where(known, np.angle(values), np.nan).astype(float)
+    wrapped = np.where(known, phases.angle(values), np.nan)
     if known.any():
         added = _solve(wrapped, known, values, coherence.values, method, looks) - wrapped
         # Solvers work in single precision and from any level: keep only their whole cycles.
-        level = np.angle(np.exp(1j * added[known]).mean())
+        level = -np.angle(phases.rotation(added[known]).mean(dtype=complex))
         cycles = np.rint((added - level) / (2 * np.pi))
     else:
         cycles = wrapped
