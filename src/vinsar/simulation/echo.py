@@ -259,10 +259,11 @@ class _Splat:
 
         single = amplitude.astype(np.float32)
         bins = np.zeros((len(positions), self.period + splat.MOST_TAPS), np.complex64)
+        copies = np.zeros((splat.COPIES, bins.shape[1]), np.complex64)
         for row, antennas in zip(bins, positions, strict=True):
             splat.spread(
                 facets, single, *antennas, reference, self.turns_per_metre, self.steps_per_metre,
-                self.taps, row,
+                self.taps, copies, row,
             )  # fmt: skip
         bins[:, : splat.MOST_TAPS] += bins[:, self.period :]
         spectrum = fft.fft(bins[:, : self.period])
