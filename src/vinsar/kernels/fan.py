@@ -48,10 +48,12 @@ def _raise_group(  # type: ignore[no-untyped-def]
         column = builder.select(builder.fcmp_ordered("<", column, last), column, last)
         index = builder.fptosi(column, emit.ints)
         share = emit.minus(column, builder.sitofp(index, emit.floats))
-        # Columns rise along a group: the window begins at the first one.
+        # Columns rise along a group: the window begins at the first one, or right of it.
         places = builder.sub(index, emit.shuffled(index, index, [0] * emit.lanes))
         start = builder.extract_element(index, ir.Constant(ir.IntType(32), 0))
-        here, there = emit.look_up(table, builder.sext(start, at.type), places, 2, 1)
+        start = builder.sext(start, at.type)
+        right = builder.add(start, ir.Constant(at.type, 1))
+        (here,), (there,) = (emit.look_up(table, k, places, 1, 1) for k in (start, right))
         z = emit.fused(share, emit.minus(there, here), here)
         slope = emit.times(emit.minus(z, up), inverse)
         # Not a choice between the two, of which LLVM makes a masked store: that is slow on AMD's.

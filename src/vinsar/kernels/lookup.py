@@ -156,7 +156,7 @@ class Emitter:
         before = ir.Constant(_INT, (size - taps) // 2)
         start = builder.sub(builder.add(middle, origin), before)
         samples = builder.trunc(cgutils.unpack_tuple(builder, table.shape)[0], _INT)
-        most = builder.sub(samples, ir.Constant(_INT, size + taps - 1))
+        most = builder.sub(samples, ir.Constant(_INT, size))
         # Whatever the indices are, no sample is read outside the table.
         below = builder.icmp_signed("<", start, ir.Constant(_INT, 0))
         start = builder.select(below, ir.Constant(_INT, 0), start)
@@ -168,17 +168,10 @@ class Emitter:
     def look_up(self, table: Any, start: Any, places: Any, taps: int, windows: int) -> list[Any]:
         """Return the samples at places in the window, and at the next ones for further taps."""
         builder = self.builder
-        if self.permuted != LANES:
-            # One register holds the window: each tap has its own, a sample further on.
-            return [
-                self._permuted(
-                    [self.load(table, builder.add(start, ir.Constant(start.type, tap)))], places
-                )
-                for tap in range(taps)
-            ]
+        count = windows * (2 if self.permuted == LANES else 1)
         registers = [
             self.load(table, builder.add(start, ir.Constant(start.type, self.lanes * number)))
-            for number in range(2 * windows)
+            for number in range(count)
         ]
         found = []
         for tap in range(taps):
