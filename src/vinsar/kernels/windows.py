@@ -6,9 +6,6 @@ import numpy as np
 
 from vinsar.kernels.compiling import kernel
 
-# Rows that are averaged along x at once.
-_ROWS = 8
-
 
 @kernel
 def mean(
@@ -34,44 +31,31 @@ def mean(
     """
     down, width = values.shape
     count = columns.size
-    across = count - sides[1] + 1
-    parts = width // across
+    parts = width // (count - sides[1] + 1)
     scale = 1.0 / (sides[0] * sides[1])
-    sums, total = np.zeros(width), np.empty(_ROWS * parts)
-    # Sums down the columns of some rows, side by side: the loops along x work on all at once.
-    strip, means = np.zeros((count, _ROWS * parts)), np.empty((across, _ROWS * parts))
+    # Sums down the columns, and of those up to each place along a row.
+    sums, total = np.zeros(width), np.zeros((count + 1) * parts)
+    ends = total[sides[1] * parts :]
     for place in range(sides[0] - 1):
         if rows[place] >= 0:
             line = values[rows[place]]
             for n in range(width):
                 sums[n] += line[n]
-    for begin in range(0, down, _ROWS):
-        some = min(_ROWS, down - begin)
-        for row in range(begin, begin + some):
-            if rows[row + sides[0] - 1] >= 0:
-                line = values[rows[row + sides[0] - 1]]
-                for n in range(width):
-                    sums[n] += line[n]
-            first = (row - begin) * parts
+    for row in range(down):
+        if rows[row + sides[0] - 1] >= 0:
+            line = values[rows[row + sides[0] - 1]]
+            for n in range(width):
+                sums[n] += line[n]
+        for part in range(parts):
+            so_far = 0.0
             for place in range(count):
                 if columns[place] >= 0:
-                    for part in range(parts):
-                        strip[place, first + part] = sums[columns[place] * parts + part]
-            if rows[row] >= 0:
-                line = values[rows[row]]
-                for n in range(width):
-                    sums[n] -= line[n]
-        total[:] = 0
-        for place in range(sides[1] - 1):
-            for n in range(total.size):
-                total[n] += strip[place, n]
-        for column in range(across):
-            enters, leaves, found = strip[column + sides[1] - 1], strip[column], means[column]
-            for n in range(total.size):
-                now = total[n] + enters[n]
-                found[n] = now * scale
-                total[n] = now - leaves[n]
-        for row in range(some):
-            for column in range(across):
-                for part in range(parts):
-                    out[begin + row, column * parts + part] = means[column, row * parts + part]
+                    so_far += sums[columns[place] * parts + part]
+                total[(place + 1) * parts + part] = so_far
+        found = out[row]
+        for n in range(width):
+            found[n] = (ends[n] - total[n]) * scale
+        if rows[row] >= 0:
+            line = values[rows[row]]
+            for n in range(width):
+                sums[n] -= line[n]
