@@ -1,12 +1,14 @@
 """A copy of the repository with a tiny study, run once for all tests of the workflow."""
 
 import fcntl
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import pytest
 
@@ -14,8 +16,19 @@ ROOT = Path(__file__).parents[2]
 FILES = ("Snakefile", "run", "requirements.lock", "CITATION.cff", "LICENSE")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _forks():
+    """Start the process that checkouts' commands fork from."""
+    command = [sys.executable, "-P", Path(__file__).with_name("forks.py")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as Checkout.forks:
+        yield
+
+
 class Checkout:
     """A copy of the repository in which Snakemake runs."""
+
+    forks: subprocess.Popen[str]
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.results = folder, folder / "results/tiny"
@@ -44,26 +57,27 @@ class Checkout:
         if extra:
             (self.folder / "extra.yaml").write_text(extra)
             files.append("extra.yaml")
-        return subprocess.run(
-            [sys.executable, "-P", "workflow/start.py", "--configfile", *files, "--nocolor",
-             *arguments],
-            cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
-            capture_output=True,
-            text=True,
-            check=False,
-        )  # fmt: skip
+        return self._run("workflow/start.py", "--configfile", *files, "--nocolor", *arguments)
 
     def ask(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run a command of ours on results, such as ``verify``."""
-        return subprocess.run(
-            [sys.executable, "-m", "vinsar", *arguments],
-            cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(self.folder / "src")},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        return self._run("vinsar", *arguments)
+
+    def _run(self, *command: str) -> subprocess.CompletedProcess[str]:
+        """Run a script or a module as Python would with PYTHONPATH set to this checkout's src."""
+        source = str(self.folder / "src")
+        told = {
+            "command": command,
+            "folder": str(self.folder),
+            "source": source,
+            "environment": os.environ | {"PYTHONPATH": source},
+        }
+        with NamedTemporaryFile("w+") as output, NamedTemporaryFile("w+") as errors:
+            told["files"] = [output.name, errors.name]
+            self.forks.stdin.write(json.dumps(told) + "\n")
+            self.forks.stdin.flush()
+            code = int(self.forks.stdout.readline())
+            return subprocess.CompletedProcess(command, code, output.read(), errors.read())
 
     def would_run(self, extra: str = "") -> set[str]:
         """Return the rules that a dry run names."""

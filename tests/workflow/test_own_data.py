@@ -1,9 +1,6 @@
 """The user's files through the workflow: exported from the tiny study, read as foreign."""
 
-import os
 import shutil
-import subprocess
-import sys
 
 import netCDF4
 import pytest
@@ -22,22 +19,11 @@ outputs: {figures: [fig4], claims: false}
 """
 
 
-def ask(folder, *arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "vinsar", *arguments],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(folder / "src")},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
 @pytest.fixture(scope="module")
 def made(checkout, new_checkout):
     """A checkout with the tiny study's echo and terrain as the user's files."""
     fresh = new_checkout()
-    done = ask(checkout.folder, "export", "results/tiny", str(fresh.folder / "echo.nc"))
+    done = checkout.ask("export", "results/tiny", str(fresh.folder / "echo.nc"))
     assert done.returncode == 0, done.stderr
     shutil.copy(checkout.results / "terrain.nc", fresh.folder / "heights.nc")
     return fresh
@@ -59,9 +45,9 @@ def test_exported_echoes_give_the_same_heights_and_nothing_that_needs_truth(chec
     chain = {"autofocus", "profiles", "images", "interferogram", "filtered", "unwrapped", "dem"}
     assert found == {*pipeline.MEASURED, *chain}
     assert not (made.results / "accuracy.json").exists()
-    verified = ask(made.folder, "verify", "results/tiny", "--configfile", "tiny.yaml", "extra.yaml")
+    verified = made.ask("verify", "results/tiny", "--configfile", "tiny.yaml", "extra.yaml")
     assert verified.returncode == 0, verified.stdout + verified.stderr
-    packed = ask(made.folder, "crate", "results/tiny", "--configfile", "tiny.yaml", "extra.yaml")
+    packed = made.ask("crate", "results/tiny", "--configfile", "tiny.yaml", "extra.yaml")
     assert packed.returncode == 0, packed.stdout + packed.stderr
     copied = made.results / "source/echo.nc"
     assert copied.read_bytes() == (made.folder / "echo.nc").read_bytes()
