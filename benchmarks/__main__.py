@@ -20,7 +20,7 @@ if "--without-avx512" in sys.argv:  # For ours and for the peer that is compiled
 import argparse  # noqa: E402
 import json  # noqa: E402
 
-from benchmarks import chain, kernels, report, scaling, timing  # noqa: E402
+from benchmarks import chain, kernels, report, scaling, sweep_scaling, timing  # noqa: E402
 
 
 def main():
@@ -49,6 +49,7 @@ def main():
         result["stages"] = chain.stages()
         result["stages_coarse"] = chain.stages(coarse=True)
     if not (arguments.quick or arguments.without_avx512):
+        result["sweep"] = sweep_scaling.measure()
         result["scaling"], result["large"] = scaling.measure(rounds=3)
         report.plot_scaling(result, folder / "scaling.png")
         if arguments.docs:

@@ -61,6 +61,18 @@ def table(result):
             f"| chain at 5 cm: {row['chain']} | {row['workers']} frame(s) at once | "
             f"real time | {goal} | {reached} |"
         )
+    if "sweep" in result:
+        lines += [
+            "",
+            f"Cases of the vibration sweep, {result['sweep'][0]['cases']} of them:",
+            "",
+            "| workers | cases/s | to one |",
+            "|---|---|---|",
+        ]
+        lines += [
+            f"| {row['workers']} {row['kind']} | {row['cases_per_s']:.1f} | {row['to_one']:.2f} |"
+            for row in result["sweep"]
+        ]
     for title, key in (
         ("Stages of the paper's study, a core's time", "stages"),
         ("The same on the grid of 5 cm", "stages_coarse"),

@@ -47,26 +47,40 @@ def seconds(study, kind, count, name="vibration"):
         return run(study.seed, study.sweeps[name].realizations), ready
 
 
+def measure(realizations=2, rounds=3):
+    """Measure cases a second by kind and number of workers."""
+    study = vinsar.load()
+    part = study.sweeps["vibration"].model_copy(update={"realizations": realizations})
+    fastest = dict.fromkeys(KINDS, float("inf"))
+    for number in range(rounds):
+        for kind, count in KINDS:
+            one = study.model_copy(update={"seed": number, "sweeps": {"vibration": part}})
+            taken, _ = seconds(one, kind, count)
+            fastest[kind, count] = min(fastest[kind, count], taken)
+    cases = len(sweep.cases(study.model_copy(update={"sweeps": {"vibration": part}}), "vibration"))
+    return [
+        {
+            "kind": kind,
+            "workers": count,
+            "cases": cases,
+            "cases_per_s": cases / taken,
+            "to_one": fastest[kind, 1] / taken,
+        }
+        for (kind, count), taken in fastest.items()
+    ]
+
+
 def main():
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--realizations", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
-    study = vinsar.load()
-    part = study.sweeps["vibration"].model_copy(update={"realizations": arguments.realizations})
-    fastest = dict.fromkeys(KINDS, float("inf"))
-    for number in range(arguments.rounds):
-        for kind, count in KINDS:
-            one = study.model_copy(update={"seed": number, "sweeps": {"vibration": part}})
-            taken, _ = seconds(one, kind, count)
-            fastest[kind, count] = min(fastest[kind, count], taken)
-    cases = len(sweep.cases(study.model_copy(update={"sweeps": {"vibration": part}}), "vibration"))
-    print(f"{cases} cases, best of {arguments.rounds} rounds")
+    rows = measure(arguments.realizations, arguments.rounds)
+    print(f"{rows[0]['cases']} cases, best of {arguments.rounds} rounds")
     print("workers       cases/s   to one")
-    for (kind, count), taken in fastest.items():
-        speedup = fastest[kind, 1] / taken
-        print(f"{count} {kind:10} {cases / taken:8.1f} {speedup:8.2f}")
+    for row in rows:
+        print(f"{row['workers']} {row['kind']:10} {row['cases_per_s']:8.1f} {row['to_one']:8.2f}")
 
 
 if __name__ == "__main__":
