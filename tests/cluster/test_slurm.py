@@ -1,4 +1,4 @@
-"""The tiny study, and a sweep, on a SLURM of one node, as docs/sweeps.md says."""
+"""The smoke study, and a sweep, on a SLURM of one node, as docs/sweeps.md says."""
 
 import importlib.util
 import os
@@ -40,22 +40,12 @@ def environment(tmp_path_factory):
         yield variables
 
 
-# Each kind of rule: the whole chain, a sweep, the claims, and a figure of no product, of all, of a
-# sweep, and the panels of a sheet. Each job more takes 8 s, most of them to start.
-FEW = """
-outputs: {figures: [fig1, fig3, fig3h, fig5]}
-dask: {scheduler: processes}
-"""
-
-
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory):
     folder = tmp_path_factory.mktemp("checkout")
     for name in ("workflow", "config", "profiles", "docs"):
         shutil.copytree(ROOT / name, folder / name)
-    for name in ("Snakefile", "tests/workflow/tiny.yaml"):
-        shutil.copy(ROOT / name, folder)
-    (folder / "few.yaml").write_text(FEW)
+    shutil.copy(ROOT / "Snakefile", folder)
     # The library itself, whose kernels are compiled.
     (folder / "src").symlink_to(ROOT / "src")
     return folder
@@ -76,14 +66,14 @@ IN_GROUPS = [
     *(f"{group}=100" for group in GROUPS),
 ]
 # Not the waits that spare the controller of a cluster.
-AT_ONCE = ("--seconds-between-status-checks", "1")
+AT_ONCE = ("--slurm-init-seconds-before-status-checks", "1")
 
 
 def started(checkout, environment, *arguments):
     with (checkout / "out.txt").open("wb") as out:
         return subprocess.Popen(
             [sys.executable, "-P", "workflow/start.py", "--workflow-profile", "profiles/slurm",
-             "--configfile", "tiny.yaml", "few.yaml", "--nocolor", *AT_ONCE, *arguments],
+             "--configfile", "config/smoke.yaml", "--nocolor", *AT_ONCE, *arguments],
             cwd=checkout,
             env=environment | {"PYTHONPATH": str(checkout / "src")},
             stdout=out,
@@ -103,13 +93,13 @@ def jobs(environment, state):
     return done.stdout.split()
 
 
-def test_the_study_runs_to_its_end_though_a_job_is_killed(checkout, environment):
+def test_the_smoke_study_runs_to_its_end_though_a_job_is_killed(checkout, environment):
     process = started(checkout, environment, *IN_GROUPS)
     victim, first = None, set()
     while process.poll() is None:
         running = jobs(environment, "RUNNING")
         # Not the first of all, which may be about to end: something is finished by then.
-        if not (checkout / "results/tiny/trajectory.nc").exists():
+        if not (checkout / "results/smoke/trajectory.nc").exists():
             first |= set(running)
         elif victim is None and set(running) - first:
             (victim, *_) = set(running) - first
@@ -118,9 +108,9 @@ def test_the_study_runs_to_its_end_though_a_job_is_killed(checkout, environment)
     assert process.returncode == 0, said(checkout)
     assert victim is not None
     assert "Trying to restart job" in said(checkout)
-    assert (checkout / "results/tiny/claims.json").exists()
+    assert (checkout / "results/smoke/claims.json").exists()
     verified = subprocess.run(
-        [sys.executable, "-m", "vinsar", "verify", "results/tiny"],
+        [sys.executable, "-m", "vinsar", "verify", "results/smoke"],
         cwd=checkout, env=environment | {"PYTHONPATH": str(checkout / "src")},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
@@ -130,7 +120,7 @@ def test_the_study_runs_to_its_end_though_a_job_is_killed(checkout, environment)
 
 
 def test_a_job_that_fails_shows_its_log(checkout, environment):
-    broken = checkout / "results/tiny/terrain.nc"
+    broken = checkout / "results/smoke/terrain.nc"
     if not broken.exists():
         pytest.skip("the study has not run")
     content = broken.read_bytes()

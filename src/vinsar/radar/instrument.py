@@ -19,6 +19,8 @@ import numpy as np
 from vinsar.radar import aperture, geometry, trajectory, waveform
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
@@ -359,10 +361,7 @@ class Instrument:
         gone = self._shared_band(factors, x, y) == 0
         first = np.argmax(gone, axis=0)
         low, high = _FACTORS[np.maximum(first - 1, 0)], _FACTORS[first]
-        for _ in range(_BISECTIONS):
-            middle = (low + high) / 2
-            lost = self._shared_band(middle, x, y) == 0
-            low, high = np.where(lost, low, middle), np.where(lost, middle, high)
+        _, high = _bisected(lambda factor: self._shared_band(factor, x, y) == 0, low, high)
         return np.where(gone.any(axis=0), self.baseline * high, np.inf)
 
     def _shared_band(self, factor: Floats, x: ArrayLike, y: ArrayLike) -> Floats:
@@ -433,18 +432,28 @@ class Instrument:
         By the shortest wavelength; infinite if no two targets are ambiguous.
         """
 
-        def images_once(width: float) -> bool:
+        def ambiguous(width: Floats) -> Floats:
             left, right = self.growth(x + width * np.array([-0.5, 0.5]), y)
-            return bool(abs(right - left) <= self.shortest_wavelength)
+            return np.abs(right - left) > self.shortest_wavelength
 
-        # Not by SciPy's search: every start of the workflow would wait to load it.
-        once, twice = 0.0, 1e4
-        if images_once(twice):
+        widest = np.array(1e4)
+        if not ambiguous(widest):
             return math.inf
-        for _ in range(_BISECTIONS):
-            width = (once + twice) / 2
-            once, twice = (width, twice) if images_once(width) else (once, width)
-        return once
+        return float(_bisected(ambiguous, np.zeros(()), widest)[0])
+
+
+def _bisected(
+    beyond: Callable[[Floats], Floats], low: Floats, high: Floats
+) -> tuple[Floats, Floats]:
+    """Return bounds, of one shape, drawn together around where a condition begins to hold.
+
+    SciPy's search does as much, but every start of the workflow would wait to load it.
+    """
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        there = beyond(middle)
+        low, high = np.where(there, low, middle), np.where(there, middle, high)
+    return low, high
 
 
 def settles(ratio: float, phase_std: float) -> bool:
