@@ -166,8 +166,9 @@ def _examine(samples: Complexes) -> tuple[dict[str, Flags], Flags]:
     name("the same as the one before", repeated)
     name("stuck for a part of the frequencies", _hanging(known))
     magnitude = np.abs(known)
-    # Rows are sorted faster than their median is selected.
-    typical = np.sort(magnitude, axis=1)[:, magnitude.shape[1] // 2]
+    # The median: rows are sorted faster than it is selected.
+    ordered, count = np.sort(magnitude, axis=1), magnitude.shape[1]
+    typical = (ordered[:, (count - 1) // 2] + ordered[:, count // 2]) / 2
     spikes = magnitude > _SPIKE * typical[:, None]
     # What is so in most of its samples is no spike.
     spikes = np.asarray(spikes & (typical > 0)[:, None] & rest[:, None])

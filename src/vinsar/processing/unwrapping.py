@@ -113,7 +113,7 @@ def _skimage(values: Complexes, coherence: Floats, looks: float, known: Flags) -
     del coherence, looks  # It weighs paths by the phase itself.
     from skimage.restoration import unwrap_phase
 
-    phase = np.angle(values).astype(float)
+    phase = phases.angle(values)
     masked = phase if known.all() else np.ma.masked_array(phase, ~known)
     return np.asarray(unwrap_phase(masked, rng=0))
 
@@ -128,7 +128,7 @@ def _kamui(values: Complexes, coherence: Floats, looks: float, known: Flags) -> 
     # A cut beside a pixel without a phase costs nothing.
     weights = np.where(known.ravel()[edges].all(axis=1), weights.ravel()[edges].sum(axis=1), 0)
     unwrapped = kamui.unwrap_arbitrary(
-        np.angle(values).astype(float).ravel(), edges, cells, method="ilp", weights=weights
+        phases.angle(values).ravel(), edges, cells, method="ilp", weights=weights
     )
     if unwrapped is None:
         raise ValueError("kamui found no unwrapping; try `unwrapping.method: whirlwind`")
@@ -152,7 +152,7 @@ def _snaphu(values: Complexes, coherence: Floats, looks: float, known: Flags) ->
 
 def _baselines(values: Complexes, coherence: Floats, looks: float, known: Flags) -> Floats:
     del coherence, looks, known  # The shorter baselines tell all of it (`cycles`).
-    return np.angle(values).astype(float)
+    return phases.angle(values)
 
 
 UNWRAPPERS: dict[str, Callable[[Complexes, Floats, float, Flags], Floats]] = {
