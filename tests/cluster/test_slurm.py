@@ -66,7 +66,7 @@ IN_GROUPS = [
     *(f"{group}=100" for group in GROUPS),
 ]
 # Not the waits that spare the controller of a cluster.
-AT_ONCE = ("--slurm-init-seconds-before-status-checks", "1")
+AT_ONCE = ("--seconds-between-status-checks", "1")
 
 
 def started(checkout, environment, *arguments):
